@@ -65,22 +65,47 @@ def arguments(folder: str) -> list[str]:
 def print_pdf(program: str, page: Path) -> Path:
     """Print a page to a PDF file beside it, and return the path of the file.
 
+    The browser reads a copy of the page and writes the PDF in a temporary folder (`TMPDIR`).
+
     Raises
     ------
     Error
-        If the browser fails or takes too long.
+        If the browser fails, takes too long, or cannot see the temporary folder.
     """
     target = page.with_suffix(".pdf")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, atomic(target) as part:
-        made = Path(folder) / "page.pdf"
+        made, copy = Path(folder) / "page.pdf", Path(folder) / "page.html"
+        if page.is_file():  # the browser tells of a page that is not there
+            shutil.copyfile(page, copy)
         command = [program, *arguments(folder), "--no-pdf-header-footer",
-                   f"--print-to-pdf={made}", page.resolve().as_uri()]  # fmt: skip
+                   f"--print-to-pdf={made}", copy.resolve().as_uri()]  # fmt: skip
         try:
             done = subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)
         except (OSError, subprocess.TimeoutExpired) as error:
             raise Error(f"{program} could not print {page}: {error}") from None
         if not made.is_file() or made.stat().st_size == 0:
             last = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
-            raise Error(f"{program} could not print {page}: code {done.returncode}: {last}")
+            words = f"{program} could not print {page}: code {done.returncode}: {last}"
+            if done.returncode == 0 or _from_snap(program):
+                words = (
+                    f"{program} could not print {page}: it wrote no file into {folder} that can be "
+                    "seen here, as a browser from a snap has a temporary folder of its own: set "
+                    "TMPDIR to a folder in your home directory that is not hidden, such as "
+                    f"{Path.home() / 'tmp'}, or install Chromium as a Debian package or Chrome"
+                )
+            raise Error(words)
         shutil.copyfile(made, part)
     return target
+
+
+def _from_snap(program: str) -> bool:
+    """Return whether a program is that of a snap, or a script that starts one, as on Ubuntu."""
+    path = Path(program).resolve()
+    if "snap" in path.parts or path.name == "snap":
+        return True
+    try:
+        with path.open("rb") as file:
+            head = file.read(4096)
+    except OSError:
+        return False
+    return head.startswith(b"#!") and b"/snap/bin/" in head

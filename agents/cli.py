@@ -179,10 +179,10 @@ def check(site: str, seed: int, out: Path | None) -> None:
     SITE is the name of a built-in site or a TOML file. A few releases are simulated to estimate the
     time that others take. Writes site.png.
     """
-    import rigdda
     from rigdda.agents import site_check
+    from rigdda.agents.released import released
 
-    where = rigdda.Site.load(site)
+    where = released(site)
     folder = folder_for(out, f"check-{where.name}", "site.png")
     with recorded_run(folder, where):
         site_check.draw(folder / "site.png", where)
@@ -259,19 +259,20 @@ def simulate(
     that its forces do against all blocks.
 
     Writes, each as CSV and Parquet: stations and along_slope (energies, velocity, bounce height and
-    passing rate, with quantiles and intervals), passages (every passage at a station), run_out and
-    stops (where blocks stop, also beyond the road). Writes pictures (section.png,
+    passing rate, with quantiles and intervals), passages (every passage at a station), run_out,
+    stopping and stops (where rock stops, also beyond the road). Writes pictures (section.png,
     along_slope.png, run_out.png, and one for each station), outcomes.csv and run.npz (the first
     release). With --model lumped, writes points.csv only. A run that was interrupted continues
     where it stopped.
     """
     import rigdda
     from rigdda.agents import jobs
+    from rigdda.agents.released import released
     from rigdda.agents.reports import findings, simulation_folder, stations, tables
     from rigdda.agents.reports.stations import Passing
     from rigdda.passages import check_stations
 
-    where, barriers = rigdda.Site.load(site), read_layout(layout)
+    where, barriers = released(site), read_layout(layout)
     seeds = range(seed, seed + releases)
     if model == "lumped":
         if at:
@@ -295,9 +296,9 @@ def simulate(
         tables.write_outcomes(folder / "outcomes.csv", seeds, found.outcomes)
         found.run.save(folder / "run.npz")
         passing = Passing.of(where, barriers, event, found.passages)
-        rows = simulation_folder.write(folder, passing, barriers, asked)
+        rows, rest = simulation_folder.write(folder, passing, barriers, asked)
         jobs.forget(folder)
-    show(tables.outcomes(where, barriers, found.outcomes))
+    show(tables.outcomes(where, barriers, found.outcomes, stations.stopped(rest)))
     for line, table in stations.tables(rows):
         click.echo(line)
         show(table)
@@ -305,6 +306,7 @@ def simulate(
     note(findings.of_layout(where, barriers, event))
     _warn_of_placeholders(site)
     note(stations.undecided(passing))
+    note(stations.lower_bound(rest))
     if passing.not_drawn:
         names = ", ".join(passing.not_drawn)
         note(f"no release is of {names}: give --event to simulate one of them, or more releases")
@@ -324,9 +326,9 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
     with the layout of the engineering rule. Writes fidelity.csv.
     """
     from rigdda.agents import fidelity_bias
-    from rigdda.envs import DesignProblem
+    from rigdda.agents.released import released
 
-    where = DesignProblem(site).site
+    where = released(site)
     folder = folder_for(out, f"fidelity-{where.name}", "fidelity.csv")
     with recorded_run(folder, where), progress(6 * releases) as tick:
         found = fidelity_bias.compare(where, releases, seed, tick)
@@ -352,6 +354,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     FILE.rrd and opened. For a site, one release is simulated and episode.rrd is written.
     """
     import rigdda
+    from rigdda.agents.released import released
     from rigdda.agents.reports import findings
     from rigdda.envs.replay_record import release_record
     from rigdda.replay.recording import Marks
@@ -367,7 +370,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     if file.suffix == ".rrd":
         open_viewer(file)
         return
-    where, barriers = rigdda.Site.load(target), read_layout(layout)
+    where, barriers = released(target), read_layout(layout)
     where.realise(barriers, seed, event)
     folder = folder_for(out, f"replay-{where.name}", "episode.rrd")
     with recorded_run(folder, where):
@@ -553,6 +556,7 @@ def _pose(
 
     `targets` are the greatest acceptable probabilities of reach and failure and individual risk.
     """
+    from rigdda.agents.released import released
     from rigdda.envs import DesignProblem
     from rigdda.envs.problem import Targets
 
@@ -561,7 +565,7 @@ def _pose(
     }  # fmt: skip
     if any(target is not None for target in targets):
         asked["targets"] = Targets(*targets)
-    return DesignProblem(site, **asked)
+    return DesignProblem(released(site), **asked)
 
 
 def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
@@ -743,10 +747,14 @@ def study(file: str, seed: int, out: Path | None) -> None:
     sections.png, costs.png and, of a site with traffic, risk.csv. An interrupted study continues
     from study.csv.
     """
+    from dataclasses import replace
+
     from rigdda.agents import studies
+    from rigdda.agents.released import released
     from rigdda.agents.reports import findings, study_report
 
     asked = studies.load(file)
+    asked = replace(asked, site=released(asked.site))
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.FILES)
     with recorded_run(folder, asked.site), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
@@ -809,10 +817,13 @@ def corridor(
 
     import rigdda
     from rigdda.agents.corridor.planning import Planner
+    from rigdda.agents.released import released
     from rigdda.agents.reports import corridor_folder as report
     from rigdda.envs import CorridorProblem
 
     where = rigdda.Corridor.load(file)
+    sections = tuple(replace(section, site=released(section.site)) for section in where.sections)
+    where = replace(where, sections=sections)
     if budgets:
         where = replace(where, budgets=budgets)
     problem = CorridorProblem(where, checks=checks)
@@ -942,12 +953,12 @@ def sensitivity(
     Writes sensitivity.csv (indices with intervals), samples.csv (inputs and outputs at each point)
     and tornado.png. A run that was interrupted continues where it stopped.
     """
-    import rigdda
     from rigdda.agents import parameters
     from rigdda.agents import sensitivity as job
+    from rigdda.agents.released import released
     from rigdda.agents.reports import sensitivity_report
 
-    where, barriers = rigdda.Site.load(site), read_layout(layout)
+    where, barriers = released(site), read_layout(layout)
     where.realise(barriers)
     inputs = parameters.inputs(names, where, barriers, posterior)
     asked = job.plan(where, barriers, inputs, method, samples, releases, seed)

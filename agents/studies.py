@@ -20,7 +20,7 @@ import rigdda
 from rigdda import BadInput, Layout, Outcome, Site, check
 from rigdda.agents import limits
 from rigdda.agents.reports.study_report import StudiedLayout, StudyResults
-from rigdda.agents.reports.tables import HIT, OUTCOME, outcome_row, write_rows
+from rigdda.agents.reports.tables import HIT, OUTCOME, RUN_OUT, outcome_row, write_rows
 from rigdda.barriers import from_table
 from rigdda.envs.cost import Account, Facts, learn
 from rigdda.envs.outcome_cache import mechanics
@@ -148,7 +148,7 @@ CHUNK = 64
 """Number of releases that are simulated together before their rows are written."""
 
 _NUMBERS = (
-    "width", "released_volume", "reached", *OUTCOME, "run_out_50", "run_out_95", "run_out_100",
+    "width", "released_volume", "reached", *OUTCOME, *RUN_OUT,
 )  # fmt: skip
 """Columns with numbers of an outcome, without those of the barriers."""
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rigdda.envs.arrivals import with_release_rates
 from rigdda.envs.comparison import Difference, compare
 from rigdda.envs.corridor_problem import CorridorEvaluation, CorridorProblem
 from rigdda.envs.cost import Evaluation
@@ -26,6 +27,7 @@ __all__ = [
     "Targets",
     "compare",
     "sb3_vec_env",
+    "with_release_rates",
 ]
 
 

@@ -20,6 +20,7 @@ from rigdda.barriers import describe
 from rigdda.barriers.fence import PANEL
 from rigdda.envs.intervals import Estimate, Interval, Known, Mean, cost, estimate, pair, total
 from rigdda.model.traffic import Traffic
+from rigdda.rounding import between
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,9 +192,9 @@ class Evaluation:
 
 
 def _span(ends: Interval, form: str = ",.1f") -> str:
-    """Return an interval as text; empty if an end is not finite."""
+    """Return an interval as text, its ends rounded outward; empty if an end is not finite."""
     low, high = ends
-    return f"{low:{form}} to {high:{form}}" if math.isfinite(high - low) else ""
+    return between(low, high, form) if math.isfinite(high - low) else ""
 
 
 @dataclass(frozen=True, slots=True)

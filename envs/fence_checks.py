@@ -20,6 +20,7 @@ from rigdda.envs.design_envelope import DesignEnvelope, EventEnvelope
 from rigdda.envs.quantiles import Quantile
 from rigdda.model.existing import WornFence
 from rigdda.model.partial_factors import PartialFactors
+from rigdda.rounding import between
 
 
 class Action(NamedTuple):
@@ -259,7 +260,7 @@ class FenceCheck:
         share = f"{100.0 * self.factors.quantile:g} % quantile"
         if not action.enough:
             return f"largest of {action.passing:.0f}, too few for a {share}"
-        return f"{share}, {value.low:.3g} to {value.high:.3g}"
+        return f"{share}, {between(value.low, value.high, '.3g')}"
 
     def _worn(self) -> str:
         fence = self.fence

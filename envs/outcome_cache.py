@@ -75,7 +75,7 @@ NO_MOTION = (
 """Tables of a site that do not affect the outcome of a release with given barriers. Existing
 barriers are among the given ones, see `Key`."""
 
-NO_EVENT_MOTION = ("rate", "design")
+NO_EVENT_MOTION = ("rate", "rate_of", "design")
 """Fields of an event that do not affect the outcome of its releases."""
 
 

@@ -165,11 +165,13 @@ which cannot move, is for experiments only and not included."""
 
 
 def checked_site(site: object, cheaper: str) -> Site:
-    """Return a site, loaded if necessary, at a fidelity."""
+    """Return a site, loaded if necessary, at a fidelity; its rates must be those of releases."""
     if isinstance(site, str | os.PathLike):
         site = Site.load(site)
     if not isinstance(site, Site):
         raise BadInput("site", site, "give a name, a TOML file or a rigdda.Site")
+    for event in site.events:
+        event.check_released()
     return site_at_fidelity(site, cheaper)
 
 

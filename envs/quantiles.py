@@ -57,19 +57,27 @@ class BlockSample(NamedTuple):
         Index of the event of each release, including releases without a block.
     rate : (E,) array
         How often each event happens [1/year], in any unit of length.
+    size : (n,) array, optional
+        Size of each block, such as its mass. Blocks count in proportion to it; by default all count
+        the same.
     """
 
     values: Floats
     release: Ints
     event: Ints
     rate: Floats
+    size: Floats | None = None
 
     @property
     def weight(self) -> Floats:
-        """Weight of each block: the rate of its event over the number of its releases, (n,)."""
+        """Weight of each block, (n,).
+
+        It is the rate of its event over the number of releases of the event, times its size.
+        """
         counts = np.bincount(self.event, minlength=len(self.rate))
         each = self.rate / np.maximum(counts, 1)
-        return each[self.event][self.release]
+        weight = each[self.event][self.release]
+        return weight if self.size is None else weight * self.size
 
     def variance(self, residuals: Floats) -> float:
         """Return the variance of a weighted mean with these residuals, between releases.

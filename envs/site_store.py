@@ -32,7 +32,7 @@ STATISTICS = ("cost", "design_envelope", "ensemble", "envelope", "intervals", "o
 
 UNRELATED = ("agents", "envs", "replay", "sites", "validation", "corridor", "display",
              "drawing", "errors", "files", "limit_equilibrium", "lumped_mass",
-             "site_generator", "site_names", "survey")  # fmt: skip
+             "rounding", "site_generator", "site_names", "survey")  # fmt: skip
 """Folders and modules of `rigdda` that do not affect the releases of a given site. Those that make
 a site are among them, because values are stored by its content."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,8 @@ from hypothesis import strategies as st
 from light_site import LIGHT
 
 import rigdda
-from rigdda import BadInput, Fence, Outcome, Site
+from rigdda import BadInput, Fence, GravityWall, Outcome, Site
+from rigdda.agents.reports.tables import write_outcomes
 from rigdda.envs import DesignProblem
 from rigdda.envs.cost import Risk, judge
 from rigdda.envs.intervals import Mean
@@ -120,6 +122,41 @@ def test_risk_of_a_site_equals_hand_calculation(site: Site) -> None:
     person = 500.0 / (365.0 * 7200.0) * 250.0 * killed / 1.5
     assert risk.individual.value == pytest.approx(person, rel=1e-12)
     assert risk.individual.low < risk.individual.value < risk.individual.high
+
+
+def test_the_risk_is_that_of_rock_only_as_the_outcome_table_gives_it(tmp_path: Path) -> None:
+    """The formula of docs/risk.md by hand; a wall that was pushed onto the road does not count."""
+    wall = GravityWall(25.0, 2.0, 1.0)
+    site = msgspec.structs.replace(LIGHT, traffic=_with(vulnerability=((0.5, 0.1), (4.0, 0.9))))
+    jobs = [(site, (wall,), seed, name) for name in site.event_names for seed in range(30)]
+    simulated = rigdda.release_many(jobs)
+    pushed = [
+        replace(o, barriers=(replace(o.barriers[0], failed=True, state="slid", road_area=1.5),))
+        for o in simulated
+    ]
+    write_outcomes(tmp_path / "outcomes.csv", [job[2] for job in jobs], pushed)
+    with (tmp_path / "outcomes.csv").open(newline="") as file:
+        table = list(csv.DictReader(file))
+    density, late = 7200.0 / 24.0 / 72_000.0, 20.0 * 2.5 + 400.0 / 6.8
+    hits = killed = 0.0
+    for name in site.event_names:
+        own, rate = [r for r in table if r["event"] == name], site.event(name).rate / 100.0
+        for row in own:
+            came, lies = row["reached"] == "True", float(row["debris_on_road"]) > 0.0
+            n_h = density * (5.4 + float(row["width"])) * came
+            v_h = float(np.interp(float(row["road_volume"]), [0.5, 4.0], [0.1, 0.9]))
+            hits += rate * n_h / len(own)
+            killed += rate * 1.5 * (n_h * v_h + density * late * lies * 0.1) / len(own)
+    assert 0 < sum(row["reached"] == "True" for row in table) < len(table)
+    risk = judge(site, (wall,), pushed, {}, {}).risk
+    assert risk is not None
+    assert risk.hit.value == pytest.approx(250.0 * hits, rel=1e-12)
+    assert risk.fatalities.value == pytest.approx(250.0 * killed, rel=1e-12)
+    person = 500.0 / (365.0 * 7200.0 * 1.5) * 250.0 * killed
+    assert risk.individual.value == pytest.approx(person, rel=1e-12)
+    assert judge(site, (wall,), simulated, {}, {}).risk == risk
+    harm = [judge(site, (wall,), each, {}, {}).harm for each in (simulated, pushed)]
+    assert harm[0] < harm[1]
 
 
 def test_individual_risk_of_a_passage_is_that_of_one_vehicle() -> None:

@@ -26,6 +26,7 @@ from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.design_envelope import DesignEnvelope
 from rigdda.envs.fence_checks import Demand, FenceCheck, demand_at, demands
 from rigdda.envs.ritchie_ditch import RitchieDitch
+from rigdda.rounding import between
 
 COVERED = 0.95
 """Least share of the design blocks that reach the road which must cross the station of a fence [-].
@@ -74,7 +75,7 @@ class RuleAnswer:
         if sure or not possible:
             return ""
         words = ", ".join(
-            f"{name} {low:.2f} to {high:.2f}"
+            f"{name} {between(low, high, '.2f')}"
             for name, (low, high) in ranges.items()
             if low < 1.0 <= high
         )

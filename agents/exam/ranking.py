@@ -17,6 +17,7 @@ from scipy.stats import trim_mean
 from rigdda.agents.exam.scorer import ExamPart, ExamScore
 from rigdda.agents.exam.specification import References
 from rigdda.agents.reports import pictures, tables
+from rigdda.rounding import between
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -146,7 +147,7 @@ def with_interval(row: dict[str, Any]) -> str:
     score = f"{row['score']:.3f}"
     if math.isnan(row["score_low"]):
         return score
-    return f"{score} ({row['score_low']:.3f} to {row['score_high']:.3f})"
+    return f"{score} ({between(row['score_low'], row['score_high'], '.3f')})"
 
 
 def table(summaries: Sequence[dict[str, Any]]) -> Table:

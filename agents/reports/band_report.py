@@ -58,7 +58,7 @@ def table(band: Band) -> Table:
         cells = [case.name, euros(float(np.median(z))), span((min(z), max(z)))]
         if band.events:
             worst = [max(e.reach[name].probability for name in band.events) for e in own]
-            cells.append(f"{percent(min(worst))} to {percent(max(worst))}")
+            cells.append(f"{percent(min(worst), 'down')} to {percent(max(worst), 'up')}")
         out.add_row(*cells)
     return out
 

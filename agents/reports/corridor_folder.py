@@ -12,9 +12,10 @@ import rigdda
 from rigdda.agents.corridor.planning import OPTIMUM, BudgetPlan, CorridorPlan
 from rigdda.agents.reports.pictures import DPI, EVENTS, FONT, save
 from rigdda.agents.reports.tables import empty_table, write_rows
-from rigdda.agents.reports.wording import percent
+from rigdda.agents.reports.wording import euros, percent
 from rigdda.barriers import KINDS
 from rigdda.display import ROAD
+from rigdda.rounding import Rounding
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -170,7 +171,7 @@ def table_of_budgets(plan: CorridorPlan) -> Table:
         out.add_row(
             limit,
             thousands(found.cost),
-            f"{thousands(found.gain)} ({thousands(low)} to {thousands(high)})",
+            f"{thousands(found.gain)} ({thousands(low, 'down')} to {thousands(high, 'up')})",
             percent(share(plan, found.gain)),
             *simple,
             f"{own.shadow_price:.2g}",
@@ -195,10 +196,9 @@ def table_of_sections(plan: CorridorPlan, own: BudgetPlan) -> Table:
     return out
 
 
-def thousands(value: float) -> str:
+def thousands(value: float, rounding: Rounding = "nearest") -> str:
     """Return an amount of money in thousands: three significant figures below 100 thousand."""
-    number = value / 1e3
-    return f"{number:,.0f}" if abs(number) >= 99.95 else f"{number:.3g}"
+    return euros(value / 1e3, rounding)
 
 
 def shown_budget(plan: CorridorPlan) -> BudgetPlan:

@@ -20,7 +20,7 @@ from rigdda.agents.reports.html_blocks import (
 )
 from rigdda.agents.reports.stations import ALL, QUANTITIES, RATE
 from rigdda.agents.reports.stations import SHOWN as MAIN
-from rigdda.agents.reports.wording import euros, percent
+from rigdda.agents.reports.wording import euros, percent, small, tenth
 from rigdda.barriers import describe, from_table
 
 PER_YEAR = "EUR per metre of road and year"
@@ -85,11 +85,6 @@ def _budget(text: str) -> str:
         return text
 
 
-def small(number: float) -> str:
-    """Return a small number with two significant figures."""
-    return f"{number:.2g}"
-
-
 def _quantity(name: str, unit: str) -> str:
     """Return the name of a quantity with its unit."""
     said = QUANTITIES[name].words if name in QUANTITIES else name.replace("_", " ")
@@ -131,6 +126,25 @@ EXHIBITS = (
             "Quantiles over all events, and how often a release passes."),
     Exhibit("passing", "run_out.png", "Run-out",
             "How often rock stops beyond each chainage, also beyond the road."),
+    Exhibit(
+        "passing",
+        "stopping.csv",
+        "Run-out of half and of 95 % of the rock",
+        "Chainage within which this share of the rock of all releases comes to rest, also beyond "
+        "the road, with its 95 % interval. Blocks count by mass, and events by rate. It is a lower "
+        "bound if it depends on rock that left the surveyed ground or still moved at the end, of "
+        "which the shares are given.",
+        (
+            words("event", "event"),
+            value("share of the rock", "share", percent),
+            interval("x [m]", "x_m", tenth),
+            words("", "bound"),
+            value("left the ground", "left", percent),
+            value("still moving", "moving", percent),
+            value("releases", "releases"),
+            value("blocks", "n"),
+        ),
+    ),
     Exhibit(
         "layouts",
         "layouts.csv",

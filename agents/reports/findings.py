@@ -10,7 +10,7 @@ from rigdda.agents.design_study import ComparedLayouts, DesignStudy, design_even
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import DesignResult
 from rigdda.agents.reports.headline import Answer, FailedCheck, failed_words
-from rigdda.agents.reports.wording import at_most, before, euros, order, percent, span
+from rigdda.agents.reports.wording import at_most, before, euros, order, percent, percentage, span
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.problem import MET, MISSED, UNDECIDED, Targets
@@ -340,9 +340,9 @@ def undecided(problem: DesignProblem, evaluation: Evaluation) -> str:
     if evaluation.targets is None:
         return ""
     pairs = (("reach", asked.reach), ("failure", asked.failure))
-    words = " and ".join(f"P({name}) <= {percent(p)}" for name, p in pairs if p is not None)
+    words = " and ".join(f"P({name}) <= {percentage(p)}" for name, p in pairs if p is not None)
     parts = [f"{words} in every design event"] if words else []
     if asked.individual is not None:
-        parts.append(f"individual risk <= {asked.individual:.2g} a year")
+        parts.append(f"individual risk <= {asked.individual:.6g} a year")
     more = "; a larger --verify would decide it" if evaluation.targets == "undecided" else ""
     return f"target {' and '.join(parts)}: {evaluation.targets}{more}"

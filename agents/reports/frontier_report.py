@@ -11,7 +11,7 @@ from rigdda import Layout, Site
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.reports import pictures
 from rigdda.agents.reports.tables import bounded, empty_table, write_rows
-from rigdda.agents.reports.wording import euros, percent, unchanged
+from rigdda.agents.reports.wording import euros, percent, percentage, unchanged
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem
 
@@ -98,7 +98,7 @@ def draw(path: Path, problem: DesignProblem, front: Sequence[TriedLayout]) -> No
                           label=words)  # fmt: skip
         if problem.targets.reach is not None:
             axes.axhline(100.0 * problem.targets.reach, color="#d0312d", linestyle="--",
-                         label=f"target: {percent(problem.targets.reach)}")  # fmt: skip
+                         label=f"target: {percentage(problem.targets.reach)}")  # fmt: skip
         axes.set(xlabel="cost to build [EUR per metre of road]", ylabel="P(reach) [%]")
         axes.set(xlim=(0.0, None), ylim=(0.0, None))
         axes.grid(alpha=0.25)

@@ -13,8 +13,9 @@ from typing import Any
 
 from rigdda import BadInput
 from rigdda.agents.reports.results_folder import FIELD, ResultsFolder
-from rigdda.agents.reports.wording import euros, figure, percent
+from rigdda.agents.reports.wording import at_most, euros, figure, percent
 from rigdda.files import read
+from rigdda.rounding import NumberForm, Rounding, rounded
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,40 +164,44 @@ def _said(text: str) -> str:
     return {"True": "yes", "False": "no"}.get(text, text)
 
 
-def value(head: str, name: str, form: Callable[[float], str] = figure) -> Column:
+def value(head: str, name: str, form: NumberForm = figure) -> Column:
     """Return a column of numbers, "-" where there is none."""
     return Column(head, (name,), lambda x: "-" if math.isnan(x) else form(x))
 
 
-def interval(head: str, name: str, form: Callable[[float], str] = figure) -> Column:
-    """Return a column of numbers with the ends of their intervals in brackets, if they differ."""
+def interval(head: str, name: str, form: NumberForm = figure) -> Column:
+    """Return a column of numbers with the ends of their intervals in brackets, if they differ.
+
+    The ends are rounded outward.
+    """
     return spread(head, (name, f"{name}_low", f"{name}_high"), form)
 
 
-def spread(head: str, names: tuple[str, str, str], form: Callable[[float], str] = figure) -> Column:
+def spread(head: str, names: tuple[str, str, str], form: NumberForm = figure) -> Column:
     """Return a column like `interval` from three columns: the value and the ends."""
 
     def text(x: float, low: float, high: float) -> str:
         if math.isnan(x) or low == x == high:
             return "-" if math.isnan(x) else form(x)
-        ends = " to ".join("?" if math.isnan(end) else form(end) for end in (low, high))
-        return f"{form(x)} ({ends})"
+        least = "?" if math.isnan(low) else form(low, "down")
+        most = "?" if math.isnan(high) else form(high, "up")
+        return f"{form(x)} ({least} to {most})"
 
     return Column(head, names, text)
 
 
 def bounded(head: str, name: str) -> Column:
-    """Return a column of probabilities with their upper bounds in brackets."""
+    """Return a column of probabilities with their upper bounds, rounded up, in brackets."""
 
     def text(x: float, bound: float) -> str:
-        return "-" if math.isnan(x) else f"{percent(x)} (≤ {percent(bound)})"
+        return "-" if math.isnan(x) else f"{percent(x)} (≤ {at_most(bound)})"
 
     return Column(head, (name, f"{name}_bound"), text)
 
 
-def plain(number: float) -> str:
+def plain(value: float, rounding: Rounding = "nearest", /) -> str:
     """Return a number as it was given, such as a chainage."""
-    return f"{number:.10g}"
+    return rounded(value, ".10g", rounding)
 
 
 def money(head: str, name: str) -> Column:

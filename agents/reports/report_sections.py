@@ -29,7 +29,17 @@ from rigdda.agents.reports.html_blocks import (
 from rigdda.agents.reports.results_folder import FIELD, ResultsFolder
 from rigdda.agents.reports.stations import RATE
 from rigdda.agents.reports.tables import RISKS
-from rigdda.agents.reports.wording import before, euros, figure, order, percent, span
+from rigdda.agents.reports.wording import (
+    at_most,
+    before,
+    euros,
+    figure,
+    order,
+    percent,
+    percentage,
+    small,
+    span,
+)
 from rigdda.agents.run_record import RunRecord
 
 Folders = Sequence[ResultsFolder]
@@ -189,7 +199,7 @@ def _asked(folder: ResultsFolder) -> str:
 
 def _limit(name: str, value: float) -> str:
     """Return the value of a target as text."""
-    return f"{value:.2g}" if name == "target_risk" else percent(value)
+    return f"{value:.6g}" if name == "target_risk" else percentage(value)
 
 
 def _money_of(row: Row) -> str:
@@ -209,7 +219,7 @@ def _individual(
     if name in own and without in own:
         now, then = (float(own[layout]["individual"]) for layout in (name, without))
         high = float(own[name]["individual_high"])
-        rest = f"a year, at most {high:.2g}; {bare} {then:.2g}"
+        rest = f"a year, at most {small(high, 'up')}; {bare} {then:.2g}"
         yield "A commuter is killed", f"{now:.2g}", rest
 
 
@@ -222,12 +232,12 @@ def _chances(
         if row["design"] == "True" and row["layout"] == name:
             earlier = next(r for r in rows if r["event"] == row["event"] and r["layout"] == without)
             reach, bound = float(row["reach"]), float(row["reach_bound"])
-            rest = f"at most {percent(bound)}; {bare} {percent(float(earlier['reach']))}"
+            rest = f"at most {at_most(bound)}; {bare} {percent(float(earlier['reach']))}"
             yield f"“{row['event']}” reaches the road", percent(reach), rest
             fails, bound = float(row["failure"]), float(row["failure_bound"])
             if name != without:
                 yield f"A barrier fails in “{row['event']}”", percent(fails), (
-                    f"at most {percent(bound)}"
+                    f"at most {at_most(bound)}"
                 )  # fmt: skip
 
 

@@ -12,8 +12,9 @@ import numpy as np
 from rigdda.agents.parameters import Input, Parameter
 from rigdda.agents.reports.pictures import DPI, FONT, save
 from rigdda.agents.reports.tables import empty_table, write_rows
-from rigdda.agents.reports.wording import euros, span
+from rigdda.agents.reports.wording import euros, small, span
 from rigdda.agents.sensitivity import AnalysedInput, Output, Sensitivity
+from rigdda.rounding import Rounding
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -113,14 +114,15 @@ def tables(found: Sensitivity) -> list[tuple[str, Table]]:
     return out
 
 
-def _number(value: float) -> str:
+def _number(value: float, rounding: Rounding = "nearest") -> str:
     """Return a number with two or three significant figures as text."""
-    return euros(value) if abs(value) >= 1.0 or value == 0.0 else f"{value:.2g}"
+    large = abs(value) >= 1.0 or value == 0.0
+    return euros(value, rounding) if large else small(value, rounding)
 
 
 def _ends(low: float, high: float) -> str:
-    """Return an interval as text."""
-    return f"{_number(low)} to {_number(high)}"
+    """Return an interval as text, its ends rounded outward."""
+    return f"{_number(low, 'down')} to {_number(high, 'up')}"
 
 
 LONGEST = 24

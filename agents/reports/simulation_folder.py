@@ -16,7 +16,7 @@ from rigdda.passages import check_stations, ends
 
 Floats = NDArray[np.float64]
 
-TABLES = ("stations", "along_slope", "passages", "run_out", "stops")
+TABLES = ("stations", "along_slope", "passages", "run_out", "stopping", "stops")
 """Names of the tables, each written as CSV and as Parquet."""
 
 WAY, MOST = 60, 150
@@ -52,8 +52,8 @@ def lines(site: Site, asked: Floats) -> Floats:
     return check_stations(site, [*along(site).tolist(), *asked.tolist()])
 
 
-def write(folder: Path, passing: Passing, layout: Layout, asked: Floats) -> Rows:
-    """Write the tables and pictures of releases; return the rows of the table of stations.
+def write(folder: Path, passing: Passing, layout: Layout, asked: Floats) -> tuple[Rows, Rows]:
+    """Write the tables and pictures of releases; return those of the stations and of stopping.
 
     Raises
     ------
@@ -63,16 +63,17 @@ def write(folder: Path, passing: Passing, layout: Layout, asked: Floats) -> Rows
     places = np.searchsorted(passing.found.stations, asked).tolist()
     even = np.searchsorted(passing.found.stations, along(passing.site)).tolist()
     rows, slope = stations.summary(passing, places), stations.summary(passing, even)
-    reached = stations.run_out(passing)
+    reached, rest = stations.run_out(passing), stations.stopping(passing)
     fields = stations.raw_fields(passing.site)
     stations.write(folder / "stations", rows)
     stations.write(folder / "along_slope", slope)
     stations.write(folder / "passages", stations.raw(passing, places), fields)
     stations.write(folder / "run_out", reached)
+    stations.write(folder / "stopping", rest)
     stations.write(folder / "stops", stations.stops(passing))
     pictures.released(folder / "section.png", passing, layout, slope)
     station_pictures.along_slope(folder / "along_slope.png", passing, slope)
     station_pictures.run_out(folder / "run_out.png", passing, reached)
     for place, x in zip(places, asked.tolist(), strict=True):
         station_pictures.station(folder / f"{_picture(x)}.png", passing, place, rows)
-    return rows
+    return rows, rest

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from rigdda import Layout, Site
 from rigdda.agents.reports.tables import empty_table, write_rows
-from rigdda.agents.reports.wording import figure, survey_place
+from rigdda.agents.reports.wording import figure, percent, survey_place
 from rigdda.envs.intervals import Estimate, Mean, estimate, total
 from rigdda.envs.quantiles import BlockSample, Quantile, mean, quantiles
 from rigdda.files import atomic
-from rigdda.passages import LEFT, MOVING, STATES, Passages, ends
+from rigdda.passages import AT_END, LEFT, MOVING, STATES, Passages, ends
+from rigdda.rounding import rounded
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -320,6 +321,89 @@ def _beyond(passing: Passing, group: str, grid: Floats) -> Iterator[dict[str, An
         }  # fmt: skip
 
 
+ROCK = (0.5, 0.95)
+"""Shares of the rock for which the chainage is told within which it comes to rest."""
+
+
+def stopping(passing: Passing) -> Rows:
+    """Return the rows of a table of the chainages within which a share of the rock comes to rest.
+
+    One row for each event, and for all events together, and each share of `ROCK`. Each block counts
+    in proportion to its mass, and each event in proportion to its rate; blocks beyond the road
+    count where they are. `x_m` is the smallest chainage that at least this share of the rock does
+    not pass, with the ends of its 95 % interval. The place where a block stops is not known if it
+    left the profile or still moved at the end of its release. If `x_m` depends on such blocks, it
+    is where they were last, and `bound` is "lower bound"; an end of the interval that depends on
+    them, or for which there are too few releases, is empty. `left` and `moving` are the shares of
+    the rock in such blocks.
+    """
+    return [row for group in passing.groups for row in _stopping(passing, group)]
+
+
+def _stopping(passing: Passing, group: str) -> Iterator[dict[str, Any]]:
+    """Yield the rows of one event of the table of chainages within which rock comes to rest."""
+    table = passing.own(group, passing.found.stops)
+    sample = passing.sample(group, table, table["x"])._replace(size=table["mass"])
+    known = table["state"] == AT_END
+    beyond = sample._replace(values=np.where(known, table["x"], math.inf))
+    weight = sample.weight
+    left, moving = (
+        float(weight[table["state"] == state].sum() / weight.sum()) if len(table) else math.nan
+        for state in (LEFT, MOVING)
+    )
+    nowhere = dict.fromkeys(survey_place(passing.site, passing.site.road.start), math.nan)
+    pairs = zip(quantiles(sample, ROCK), quantiles(beyond, ROCK), strict=True)
+    for share, (least, most) in zip(ROCK, pairs, strict=True):
+        high = most.high if math.isfinite(most.high) else math.nan
+        yield {
+            "event": group,
+            "share": share,
+            "releases": len(passing.releases(group)),
+            "n": len(table),
+            **_ends("x_m", Quantile(least.value, least.low, high)),
+            **(survey_place(passing.site, least.value) if len(table) else nowhere),
+            "bound": "lower bound" if most.value > least.value else "",
+            "left": left,
+            "moving": moving,
+        }
+
+
+def stopped(rows: Rows) -> tuple[str, str]:
+    """Return the chainage within which 95 % of the rock comes to rest, and its interval, in words.
+
+    Parameters
+    ----------
+    rows : list of dict
+        Table of `stopping`; the last row is meant.
+    """
+    row = rows[-1]
+    if math.isnan(row["x_m"]):
+        return "-", "-"
+    value = rounded(row["x_m"], ".1f", "down" if row["bound"] else "nearest")
+    low = "?" if math.isnan(row["x_m_low"]) else rounded(row["x_m_low"], ".1f", "down")
+    high = "?" if math.isnan(row["x_m_high"]) else rounded(row["x_m_high"], ".1f", "up")
+    return f">= {value}" if row["bound"] else value, f"{low} to {high}"
+
+
+def lower_bound(rows: Rows) -> str:
+    """Return a sentence on a run-out that is a lower bound only; it is empty if it is known.
+
+    Parameters
+    ----------
+    rows : list of dict
+        Table of `stopping`; the last row is meant.
+    """
+    row = rows[-1]
+    if not row["bound"]:
+        return ""
+    pairs = ((row["left"], "left the surveyed ground"), (row["moving"], "still moved at the end"))
+    words = " and ".join(f"{percent(share)} of the rock {what}" for share, what in pairs if share)
+    return (
+        f"the run-out of 95 % of the rock is a lower bound, because {words}: give a longer profile "
+        "or a longer motion.duration to know it"
+    )
+
+
 def undecided(passing: Passing) -> str:
     """Return in words how many blocks had not stopped at the end, nothing if none."""
     state, words = passing.found.stops["state"], []
@@ -384,5 +468,5 @@ def _words(row: dict[str, Any], name: str) -> str:
         return "-"
     if name == "q50":
         return figure(row[name])
-    low, high = (figure(row[f"{name}_{end}"]) for end in ("low", "high"))
+    low, high = figure(row[f"{name}_low"], "down"), figure(row[f"{name}_high"], "up")
     return f"{figure(row[name])} ({low} to {high})"

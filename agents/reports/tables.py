@@ -29,6 +29,7 @@ from rigdda.agents.reports.wording import (
     at_most,
     euros,
     percent,
+    small,
     span,
     survey_place,
     surveyed,
@@ -37,6 +38,7 @@ from rigdda.barriers import Earthwork, to_tables
 from rigdda.envs.cost import Risk
 from rigdda.envs.intervals import Estimate, Mean, estimate, mid_p, student_interval
 from rigdda.files import atomic
+from rigdda.rounding import between
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -53,6 +55,10 @@ OUTCOME = {
     "beyond_fraction": ("rock beyond the road at the end", "%", 100.0),
 }
 """Description, unit and factor for printing of each field of an outcome."""
+
+RUN_OUT = ("run_out_to_road_50", "run_out_to_road_95", "run_out_to_road_100")
+"""Columns with the chainages of a release that contain 50, 95 and 100 % of its rock, which are cut
+at the downhill edge of the road [m]; see `rigdda.Outcome.run_out`."""
 
 HIT = {
     "hits": ("hits", "-", 1.0),
@@ -141,7 +147,7 @@ def outcome_row(outcome: Outcome) -> dict[str, Any]:
     row: dict[str, Any] = {"event": outcome.event, "width": outcome.width}
     row |= {"released_volume": outcome.released_volume, "reached": outcome.reached}
     row |= {name: getattr(outcome, name) for name in OUTCOME}
-    row |= zip(("run_out_50", "run_out_95", "run_out_100"), outcome.run_out, strict=True)
+    row |= zip(RUN_OUT, outcome.run_out, strict=True)
     for i, barrier in enumerate(outcome.barriers):
         row |= {f"barrier_{i}_{name}": getattr(barrier, name) for name in HIT}
     return row
@@ -167,13 +173,30 @@ def applies_not(value: Any) -> bool:
     return isinstance(value, float) and math.isnan(value)
 
 
-def outcomes(site: Site, layout: Layout, results: Sequence[Outcome]) -> Table:
-    """Return the table of means over releases with 95 % intervals."""
+def outcomes(
+    site: Site,
+    layout: Layout,
+    results: Sequence[Outcome],
+    run_out: tuple[str, str] | None = None,
+) -> Table:
+    """Return the table of means over releases with 95 % intervals.
+
+    Parameters
+    ----------
+    site, layout : Site, Layout
+        The site and the layout.
+    results : sequence of Outcome
+        The outcomes.
+    run_out : (str, str), optional
+        Chainage within which 95 % of the rock comes to rest and its interval, see
+        `rigdda.agents.reports.stations.stopped`; outcomes do not contain it, because they end at
+        the road.
+    """
     table = empty_table(("", "mean", "95 % interval"))
 
-    def add(words: str, unit: str, factor: float, values: list[float], low: float = 0.0) -> None:
+    def add(words: str, unit: str, factor: float, values: list[float]) -> None:
         sample = factor * np.array(values, dtype=np.float64)
-        ends = _interval(sample, low, unit == "%")
+        ends = _interval(sample, 0.0, unit == "%")
         table.add_row(f"{words} [{unit}]", f"{sample.mean():.4g}", _span(ends, ".4g"))
 
     chance = estimate(sum(outcome.reached for outcome in results), len(results))
@@ -182,8 +205,8 @@ def outcomes(site: Site, layout: Layout, results: Sequence[Outcome]) -> Table:
     table.add_row(head, f"{100.0 * chance.probability:.4g}", _span(ends, ".4g"))
     for name, (words, unit, factor) in OUTCOME.items():
         add(words, unit, factor, [getattr(outcome, name) for outcome in results])
-    run_out = [outcome.run_out[1] for outcome in results]
-    add("run-out of 95 % of the rock", "m", 1.0, run_out, -math.inf)
+    if run_out is not None:
+        table.add_row("run-out of 95 % of the rock [m]", *run_out)
     built = zip(site.standing(layout), site.labels(layout), strict=True)
     for i, (barrier, label) in enumerate(built):
         table.add_section()
@@ -247,9 +270,9 @@ WORDS = ("description", "family", "layout", "events (1/year per 100 m)")
 
 
 def _span(interval: Iterable[float], form: str) -> str:
-    """Return an interval as text; it is "-" for a single value."""
+    """Return an interval as text, its ends rounded outward; it is "-" for a single value."""
     low, high = interval
-    return f"{low:{form}} to {high:{form}}" if math.isfinite(high - low) else "-"
+    return between(low, high, form) if math.isfinite(high - low) else "-"
 
 
 def fit(rows: Sequence[dict[str, Any]]) -> Table:
@@ -261,7 +284,7 @@ def fit(rows: Sequence[dict[str, Any]]) -> Table:
     out = empty_table(("what", "fitted", "95 %", "left out", "observed"))
     for row in rows:
         unit = f" [{row['unit']}]" if row["unit"] not in ("", "-") else ""
-        ends = f"{row['low']:.3g} to {row['high']:.3g}" if row["low"] != "" else ""
+        ends = between(row["low"], row["high"], ".3g") if row["low"] != "" else ""
         ends = "not identified" if row["identified"] == "no" else ends
         cells = (number(row[name]) for name in ("left_out", "observed"))
         out.add_row(row["what"] + unit, number(row["fitted"]), ends, *cells)
@@ -346,12 +369,12 @@ def risks(study: ComparedLayouts) -> Table | None:
 def risk_table(found: Sequence[tuple[str, Risk]]) -> Table:
     """Return the table of the risk of named layouts to the traffic on the section, per year.
 
-    The individual risk is followed by the upper end of its 95 % interval.
+    The individual risk is followed by the upper end of its 95 % interval, rounded up.
     """
     table = empty_table(("layout", "hit", "run into", "deaths", "per km", "one person"))
     for name, risk in found:
         means = (risk.hit, risk.run_into, risk.fatalities, risk.per_km)
-        one = f"{risk.individual.value:.2g} (<= {risk.individual.high:.2g})"
+        one = f"{small(risk.individual.value)} (<= {small(risk.individual.high, 'up')})"
         table.add_row(name, *(f"{mean.value:.2g}" for mean in means), one)
     return table
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from decimal import Decimal
 from typing import Any
 
 from rigdda import Barrier, Mesh, Site
 from rigdda.barriers import Removal
+from rigdda.rounding import Rounding, rounded
 
 
 def order(barrier: Barrier, site: Site) -> str:
@@ -63,38 +65,48 @@ def before(site: Site) -> str:
     return "as it stands" if site.existing else "without barriers"
 
 
-def euros(value: float) -> str:
+def euros(value: float, rounding: Rounding = "nearest") -> str:
     """Return an amount of money: whole euros from 100, three significant figures below."""
-    return f"{value:,.0f}" if abs(value) >= 99.95 else f"{value:.3g}"
+    return rounded(value, ",.0f" if abs(value) >= 99.95 else ".3g", rounding)
 
 
 def span(interval: Sequence[float]) -> str:
-    """Return an interval of amounts of money as text."""
+    """Return an interval of amounts of money as text, its ends rounded outward."""
     low, high = interval
-    return f"{euros(low)} to {euros(high)}"
+    return f"{euros(low, 'down')} to {euros(high, 'up')}"
 
 
-def percent(share: float) -> str:
+def percent(share: float, rounding: Rounding = "nearest") -> str:
     """Return a probability or a share in per cent: two significant figures below 10 %."""
-    value = 100.0 * share
-    return f"{value:.0f} %" if value >= 9.95 or value == 0.0 else f"{value:.2g} %"
+    if not math.isfinite(share):
+        return f"{share} %"
+    value = 100 * Decimal(repr(float(share)))  # exact, so that 0.07 is not above 7 %
+    return f"{rounded(value, '.0f' if value >= 9.95 or not value else '.2g', rounding)} %"
 
 
-def figure(value: float) -> str:
+def figure(value: float, rounding: Rounding = "nearest") -> str:
     """Return a number with three significant figures, and "?" if there is none."""
-    if math.isnan(value):
-        return "?"
-    return f"{value:,.0f}" if abs(value) >= 99.95 else f"{value:.3g}"
+    return "?" if math.isnan(value) else euros(value, rounding)
 
 
 def at_most(share: float) -> str:
     """Return an upper bound of a share in per cent, rounded up to the digits of `percent`."""
-    value = 100.0 * share
-    if value <= 0.0:
-        return "0 %"
-    step = 1.0 if value > 9.9 else 10.0 ** (math.floor(math.log10(value)) - 1)
-    up = step * math.ceil(value / step - 1e-9)
-    return percent(up / 100.0)
+    return percent(share, "up")
+
+
+def percentage(share: float) -> str:
+    """Return a target of a probability in per cent as it was given."""
+    return f"{100.0 * share:.6g} %"
+
+
+def tenth(value: float, rounding: Rounding = "nearest") -> str:
+    """Return a number with one decimal."""
+    return rounded(value, ".1f", rounding)
+
+
+def small(value: float, rounding: Rounding = "nearest") -> str:
+    """Return a small number with two significant figures."""
+    return rounded(value, ".2g", rounding)
 
 
 def number(value: Any) -> str:

@@ -176,8 +176,14 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             part.write_text(tomli_w.dumps(data), encoding="utf-8")
 
     def pick(self, seed: int) -> str:
-        """Return the name of the event that a seed selects at random in proportion to the rates."""
-        rates = np.array([event.rate for event in self.events])
+        """Return the name of the event that a seed selects at random in proportion to the rates.
+
+        Raises
+        ------
+        BadInput
+            If the seed is invalid, or a rate is that of arrivals, see `Event.release_rate`.
+        """
+        rates = np.array([event.release_rate for event in self.events])
         rng = np.random.default_rng([check.integer("seed", seed, 0), len(rates)])
         return self.events[rng.choice(len(rates), p=rates / rates.sum())].name
 
@@ -390,9 +396,10 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         Raises
         ------
         BadInput
-            If there is no such event or mesh option, or the layout has an option twice.
+            If there is no such event or mesh option, the layout has an option twice, or the rate is
+            that of arrivals, see `Event.release_rate`.
         """
-        often, used = self.event(event).rate / 100.0, set()
+        often, used = self.event(event).release_rate / 100.0, set()
         for barrier in layout:
             if isinstance(barrier, Mesh):
                 if barrier.option in used:
@@ -500,7 +507,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return volume, reached
 
     def toll(self, layout: Sequence[Barrier], outcome: Outcome) -> Toll:
-        """Return the expected consequences of a release for the traffic.
+        """Return the expected consequences for the traffic of the rock of a release.
+
+        A wall that was pushed onto the road does not count; its harm is part of `bill`.
 
         Raises
         ------
@@ -509,10 +518,10 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         """
         if self.traffic is None:
             raise BadInput("traffic", None, f"add the table [traffic] to site {self.name}")
-        volume, reached = self.on_road(layout, outcome)
-        lies = outcome.debris_on_road > 0.0 or volume > outcome.road_volume
+        lies = outcome.debris_on_road > 0.0
         energy = outcome.max_energy_on_road * outcome.width
-        return self.traffic.toll(reached, lies, outcome.width, volume, energy)
+        width, volume = outcome.width, outcome.road_volume
+        return self.traffic.toll(outcome.reached, lies, width, volume, energy)
 
     def shed(self) -> float:
         """Return the annual cost of a rock shed over the road [EUR per metre of road and year].

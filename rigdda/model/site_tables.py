@@ -137,6 +137,10 @@ Width = Annotated[float, about(gt=0.0, le=WIDEST)]
 Count = Annotated[int, about(ge=1, le=1000)]
 
 
+RELEASE, ARRIVAL = "release", "arrival"
+"""What the rate of an event counts."""
+
+
 @documented
 class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A type of rockfall event and its rate.
@@ -228,6 +232,16 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         ),
     ] = None
 
+    rate_of: Annotated[
+        str,
+        about(
+            "What `rate` or `return_period` counts: releases of rock, or arrivals, which are "
+            "releases of which rock reaches the road without new barriers, as a log of rock on the "
+            "road counts them. The commands convert arrivals to releases.",
+            choices=(RELEASE, ARRIVAL),
+        ),
+    ] = RELEASE
+
     def __post_init__(self) -> None:
         fields.check(self, f"{self.words}.")
         _set = msgspec.structs.force_setattr
@@ -260,6 +274,33 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             mend = f"give years: this is {rate:g} events a year on 100 m, at most {MOST_OFTEN:g}"
             raise BadInput(f"{self.words}.return_period", period, mend)
         return rate
+
+    @property
+    def release_rate(self) -> float:
+        """Rate of its releases [1/year per 100 m of slope].
+
+        Raises
+        ------
+        BadInput
+            If its rate is that of arrivals.
+        """
+        self.check_released()
+        return self.rate
+
+    def check_released(self) -> None:
+        """Check that its rate is that of releases.
+
+        Raises
+        ------
+        BadInput
+            If it is that of arrivals.
+        """
+        if self.rate_of != RELEASE:
+            mend = (
+                "convert it to the rate of releases first: "
+                "site = rigdda.envs.with_release_rates(site)"
+            )
+            raise BadInput(f"{self.words}.rate_of", self.rate_of, mend)
 
     @property
     def words(self) -> str:

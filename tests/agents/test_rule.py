@@ -292,7 +292,7 @@ def test_a_close_call_is_told() -> None:
     speed = Quantile(0.99 * edge, 0.97 * edge, 1.02 * edge)
     close = msgspec.structs.replace(event([1.0]), speed=[speed])
     found = build(DesignEnvelope([20.0], 0.95, [close], [1.0]))
-    assert found.name == "rule" and "energy 0.94 to 1.04" in found.caveat
+    assert found.name == "rule" and "energy 0.94 to 1.05" in found.caveat
     assert build(envelope({20.0: 0.9 * edge})).caveat == ""
     assert build(envelope({20.0: 90.0}, mass=1e6)).caveat == ""
 

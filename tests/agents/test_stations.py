@@ -7,6 +7,7 @@ import time
 from fractions import Fraction
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -19,7 +20,7 @@ from rigdda.agents.reports.simulation_folder import TABLES
 from rigdda.agents.reports.stations import LEVELS, QUANTITIES, Passing
 from rigdda.envs.intervals import mid_p
 from rigdda.envs.quantiles import quantiles
-from rigdda.passages import STATES, passages
+from rigdda.passages import PASSAGE, STATES, STOP, Passages, passages
 
 RELEASES = 120
 NUMBERS = ("mean", *(f"q{100 * level:g}" for level in LEVELS))
@@ -182,6 +183,83 @@ def test_where_blocks_stop_is_told_beyond_the_road(simulated: tuple[Path, str]) 
         assert float(row["probability"]) == pytest.approx(len({s["seed"] for s in beyond}) / n)
 
 
+def test_the_run_out_of_the_rock_is_what_the_stops_give(simulated: tuple[Path, str]) -> None:
+    """95 % of the rock by mass, each event weighted by its rate, also beyond the road."""
+    folder, words = simulated
+    site, stops = Site.load("verge"), rows(folder / "stops.csv")
+    releases = rows(folder / "outcomes.csv")
+    assert {row["event"] for row in rows(folder / "stopping.csv")} > {"block", stations.ALL}
+    for row in rows(folder / "stopping.csv"):
+        own = [s for s in stops if row["event"] in (s["event"], stations.ALL)]
+        if not own:
+            continue
+        each = weighted(site, own, releases)
+        mass = [w * Fraction(s["mass_kg"]) for w, s in zip(each, own, strict=True)]
+        hand = quantile([float(s["x_m"]) for s in own], mass, float(row["share"]))
+        assert float(row["x_m"]) == hand
+        assert row["x_m_low"] == "" or float(row["x_m_low"]) <= hand
+        assert int(row["n"]) == len(own)
+        assert row["x_m_high"] == "" or float(row["x_m_high"]) >= hand
+        assert row["bound"] == "" and {s["state"] for s in own} == {"at rest"}
+    assert (row["event"], row["share"]) == (stations.ALL, "0.95")
+    assert row["x_m_low"] != ""
+    (line,) = re_lines(words, "run-out of 95 % of the rock [m]")
+    assert f" {hand:.1f} " in line and "lower bound" not in words
+
+
+@pytest.mark.parametrize(
+    "states, bound, words",
+    [
+        ((0, 0, 0), "", ("196.5", "196.5 to 210.0")),
+        ((0, 0, 1), "", ("196.5", "196.5 to ?")),
+        ((0, 2, 0), "lower bound", (">= 196.5", "196.5 to ?")),
+        ((1, 0, 0), "lower bound", (">= 196.5", "196.5 to ?")),
+    ],
+)
+def test_the_run_out_is_not_cut_at_the_road(
+    states: tuple[int, ...], bound: str, words: tuple[str, str]
+) -> None:
+    """100 releases of three blocks with 10, 86 and 4 % of the rock, two of them beyond the road."""
+    site = Site.load("quick")
+    stops = np.zeros(300, dtype=STOP)
+    stops["release"], stops["block"] = np.repeat(np.arange(100), 3), np.tile(np.arange(3), 100)
+    stops["x"], stops["mass"] = np.tile([20.0, 196.5, 210.0], 100), np.tile([10.0, 86.0, 4.0], 100)
+    stops["state"] = np.tile(states, 100)
+    none = np.zeros(100, dtype=np.int64)
+    found = Passages(np.zeros(0), tuple(range(100)), none, np.zeros(0, dtype=PASSAGE), stops)
+    table = stations.stopping(Passing.of(site, (), site.event_names[0], found))
+    assert site.road.end < 196.5 and table[-1]["bound"] == bound
+    assert stations.stopped(table) == words
+    assert bool(stations.lower_bound(table)) == bool(bound)
+
+
+def test_events_without_a_release_have_empty_rows_of_the_run_out(tmp_path: Path) -> None:
+    site = Site.load("quick")
+    site = msgspec.structs.replace(site, origin=msgspec.structs.replace(site.origin, chainage=9.0))
+    found = passages(site, (), [(0, "block")], [])
+    table = stations.stopping(Passing.of(site, (), None, found))
+    stations.write(tmp_path / "stopping", table)
+    written = rows(tmp_path / "stopping.csv")
+    assert {row["event"] for row in written} == {*site.event_names, stations.ALL}
+    for row in written:
+        drawn = row["event"] in ("block", stations.ALL)
+        assert bool(row["x_m"]) == bool(row["chainage_m"]) == drawn
+    assert stations.stopped(table[2:4]) == ("-", "-") and not stations.lower_bound(table[2:4])
+
+
+@pytest.mark.slow
+def test_the_interval_of_the_run_out_holds_that_of_many_releases() -> None:
+    site, held = Site.load("verge"), 0
+    whole = passages(site, (), [(seed, "group") for seed in range(4_000)], [])
+    everything = Passing.of(site, (), "group", whole)
+    true = float(stations.stopping(everything)[-1]["x_m"])
+    for start in range(0, 4_000, 200):
+        found = passages(site, (), [(seed, "group") for seed in range(start, start + 200)], [])
+        row = stations.stopping(Passing.of(site, (), "group", found))[-1]
+        held += row["x_m_low"] <= true and not row["x_m_high"] < true
+    assert held >= 17  # of 20
+
+
 def test_a_block_that_leaves_the_profile_is_told(tmp_path: Path) -> None:
     words = run("simulate", "shu-hwa", "--event", "block, top", "--releases", 30, "--out", "o",
                 folder=tmp_path)  # fmt: skip
@@ -191,6 +269,15 @@ def test_a_block_that_leaves_the_profile_is_told(tmp_path: Path) -> None:
     assert {row["event"] for row in table} == {"block, top"}
     assert float(table[-1]["share_of_blocks"]) == pytest.approx(len(left) / 30)
     assert left and all(float(row["x_m"]) == 148.6 for row in left)
+    last = rows(tmp_path / "o/stopping.csv")[-1]
+    mass = {row["block"] + row["seed"]: float(row["mass_kg"]) for row in left}
+    whole = sum(float(row["mass_kg"]) for row in rows(tmp_path / "o/stops.csv"))
+    assert float(last["left"]) == pytest.approx(sum(mass.values()) / whole)
+    assert float(last["left"]) > 0.05  # so that the end of the ground is a lower bound only
+    assert last["bound"] == "lower bound" and float(last["x_m"]) == 148.6
+    assert last["x_m_high"] == ""
+    assert ">= 148.6" in words and "of the rock left the surveyed ground" in words
+    assert "the run-out of 95 % of the rock is a lower bound" in words
     (row, *_) = rows(tmp_path / "o/stations.csv")
     assert float(row["x_m"]) == Site.load("shu-hwa").road.start  # by default
 

@@ -60,6 +60,7 @@ def test_a_station_has_its_chainage_and_elevation(site: Site, tmp_path: Path) ->
     every = {
         "stations": rows,
         "run_out": stations.run_out(passing),
+        "stopping": stations.stopping(passing),
         "stops": stations.stops(passing),
         "passages": stations.raw(passing, [0]),
     }

@@ -6,6 +6,7 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -50,7 +51,7 @@ def wait_for(count: int, address: str) -> None:
 
 @contextmanager
 def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """Start a scheduler with two workers; yield its address and the workers."""
+    """Start a scheduler with two workers; yield its address, the workers and the scheduler."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -59,7 +60,7 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
     try:
         made += [worker(address), worker(address)]
         wait_for(2, address)
-        yield address, made[1:]
+        yield address, [*made[1:], made[0]]
     finally:
         for process in made:
             process.kill()
@@ -123,6 +124,52 @@ def test_a_worker_that_dies_loses_nothing(scheduler: str) -> None:
         third.kill()
         third.wait()
     assert found == here
+
+
+@pytest.mark.parametrize("returns", [True, False])
+def test_the_death_of_the_last_worker_is_told(
+    returns: bool, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The computation goes on when a worker is back, and fails in one line if none comes."""
+    monkeypatch.setattr(distribution, "GLANCE", 0.5)
+    monkeypatch.setattr(distribution, "DESERTED", 120.0 if returns else 3.0)
+    asked, more = jobs(200), []
+    with cluster() as (address, processes), distribution.connected(f"dask://{address}"):
+        rigdda.release_many(asked[:2])
+        for process in processes[:2]:
+            process.kill()
+            process.wait()
+        told = f"no worker is left on tcp://{address}: waiting for one; start one by dask worker "
+        try:
+            if returns:
+                again = threading.Timer(4.0, lambda: more.append(worker(address)))
+                again.start()
+                assert rigdda.release_many(asked) == rigdda.release_many(asked, threads=2)
+                again.join()
+            else:
+                with pytest.raises(rigdda.Error) as failed:
+                    rigdda.release_many(asked)
+                assert str(failed.value).startswith(f"no worker is left on tcp://{address} for 0.0")
+                assert "run the command again" in str(failed.value)
+        finally:
+            for process in more:
+                process.kill()
+                process.wait()
+    lines = capsys.readouterr().err.splitlines()
+    assert sum(line.startswith(told) for line in lines) == 1
+    assert any("a worker is back" in line for line in lines) == returns
+
+
+def test_the_death_of_the_scheduler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(distribution, "GLANCE", 0.5)
+    with cluster() as (address, processes), distribution.connected(f"dask://{address}"):
+        rigdda.release_many(jobs(2))
+        kill = threading.Timer(0.3, processes[-1].kill)
+        kill.start()
+        with pytest.raises(rigdda.Error, match=f"the scheduler tcp://{address} stopped: start it"):
+            for _ in range(200):
+                rigdda.release_many(jobs(400))
+        kill.join()
 
 
 STUDY = """site = "verge"

@@ -9,7 +9,7 @@ from rigdda.agents.barrier_checks import LayoutChecks
 from rigdda.agents.design_study import ComparedLayouts, DesignStudy, design_events
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import DesignResult
-from rigdda.agents.reports.headline import Answer, FailedCheck, failed_words
+from rigdda.agents.reports.headline import DesignAnswer, FailedCheck, failed_words
 from rigdda.agents.reports.wording import at_most, before, euros, order, percent, percentage, span
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem, Evaluation
@@ -277,10 +277,10 @@ def failed_checks(checks: LayoutChecks) -> list[FailedCheck]:
     ]
 
 
-def answer(done: DesignStudy) -> Answer:
+def answer(done: DesignStudy) -> DesignAnswer:
     """Return what the first line of a design needs."""
     site, chosen, nothing = done.problem.site, done.chosen.evaluation, done.nothing.evaluation
-    return Answer(
+    return DesignAnswer(
         layout="; ".join(order(barrier, site) for barrier in chosen.layout),
         bare=before(site),
         z=(chosen.objective, *chosen.ci),

@@ -20,7 +20,7 @@ class FailedCheck(NamedTuple):
     use: float
 
 
-class Answer(NamedTuple):
+class DesignAnswer(NamedTuple):
     """Result of a design, as far as its first line needs it.
 
     Parameters
@@ -51,7 +51,7 @@ class Answer(NamedTuple):
     failed: Sequence[FailedCheck]
 
 
-def headline(answer: Answer) -> str:
+def headline(answer: DesignAnswer) -> str:
     """Return the first line of a design.
 
     A layout is never headed "build" if it fails one of its checks, misses a target, or costs more

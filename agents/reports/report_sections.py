@@ -12,7 +12,7 @@ import rigdda
 from rigdda import BadInput, Site
 from rigdda.agents.reports import assumptions, findings
 from rigdda.agents.reports.exhibits import EXHIBITS, RAW, Exhibit
-from rigdda.agents.reports.headline import Answer, FailedCheck, headline
+from rigdda.agents.reports.headline import DesignAnswer, FailedCheck, headline
 from rigdda.agents.reports.html_blocks import (
     Block,
     Figures,
@@ -153,7 +153,7 @@ def _design(folder: ResultsFolder) -> Iterator[Block]:
     ])  # fmt: skip
 
 
-def _answer(folder: ResultsFolder, chosen: Row, nothing: Row) -> Answer:
+def _answer(folder: ResultsFolder, chosen: Row, nothing: Row) -> DesignAnswer:
     """Return what the first line of a design needs, from its files."""
     site, options = folder.site, folder.records["design"].options
     layout = rigdda.load_layout(folder.path / "layout.toml")
@@ -169,7 +169,7 @@ def _answer(folder: ResultsFolder, chosen: Row, nothing: Row) -> Answer:
         if row["satisfied"] == "False"
     ]
     names = ("objective", "objective_low", "objective_high")
-    return Answer(
+    return DesignAnswer(
         layout="; ".join(words),
         bare=before(site) if site is not None else "without barriers",
         z=(float(chosen[names[0]]), float(chosen[names[1]]), float(chosen[names[2]])),

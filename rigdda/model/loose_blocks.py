@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
 
 from rigdda.kernel import Direct, kernel, short_kernel
 from rigdda.model.block import Block
@@ -240,6 +241,35 @@ def _cut_at(corners: NDArray, x: float) -> tuple[float, float]:
     return low, high
 
 
+def logarithmic_shares(event: Event, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the shares of the logarithmic law that give the volumes of another law of an event.
+
+    Parameters
+    ----------
+    event : Event
+        An event with lognormal or surveyed volumes.
+    shares : (N,) array
+        Shares of blocks that are smaller [-].
+
+    Returns
+    -------
+    (N,) array
+        Positions of the volumes between the logarithms of the least and the greatest, 0 to 1 [-].
+    """
+    limits = event.volume_limits
+    assert limits is not None
+    low, high = np.log(limits)
+    if event.volumes and event.volume_shares:
+        found = np.interp(shares, event.volume_shares, np.log(event.volumes))
+    else:
+        assert event.volume_median is not None and event.volume_spread is not None
+        middle, spread = math.log(event.volume_median), event.volume_spread
+        first, last = ndtr((low - middle) / spread), ndtr((high - middle) / spread)
+        found = middle + spread * ndtri(first + shares * (last - first))
+    at: NDArray[np.float64] = np.clip((found - low) / max(high - low, 1e-300), 0.0, 1.0)
+    return at
+
+
 SPREAD = 1.1
 """Spacing of neighbours in a group relative to their mean length [-]. Blocks that do not fit side
 by side in the band lie in a layer above."""
@@ -260,13 +290,16 @@ def draw(
     corners = np.empty((count, most_corners, 2))
     number, area = np.empty(count, dtype=np.int64), np.empty(count)
     least_area, greatest_area = event.area or (0.0, 0.0)
+    power = 1.5 * event.exponent  # volume = area ** 1.5
+    if event.volumes or event.volume_median is not None:
+        numbers[:, AREA], power = logarithmic_shares(event, numbers[:, AREA]), 0.0
     long, middle, short = source.edges or (0.0, 0.0, 0.0)
     law = ShapeLaw(
         int(source.corners[0]),
         int(most_corners),
         float(least_area),
         float(greatest_area),
-        1.5 * event.exponent,  # volume = area ** 1.5
+        float(power),
         float(source.aspect[0]),
         float(source.aspect[1]),
         float(long),

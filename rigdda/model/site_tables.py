@@ -133,6 +133,8 @@ Area = Annotated[float, about(ge=1e-4, le=LARGEST_AREA)]
 Period = Annotated[float, about(gt=0.0, le=1e6)]
 Length = Annotated[float, about(gt=0.0, le=1e5)]
 Volume = Annotated[float, about(ge=1e-6, le=3e4)]
+Spread = Annotated[float, about(gt=0.0, le=5.0)]
+Portion = Annotated[float, about(ge=0.0, le=1.0)]
 Width = Annotated[float, about(gt=0.0, le=WIDEST)]
 Count = Annotated[int, about(ge=1, le=1000)]
 
@@ -216,6 +218,34 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             rising=True,
         ),
     ] = None
+    volume_median: Annotated[
+        Volume | None,
+        about(
+            "Median of lognormal block volumes, in place of the power law with `exponent`. "
+            "Volumes are limited to `volume`. It goes with `volume_spread`.",
+            "m3",
+        ),
+    ] = None
+    volume_spread: Annotated[
+        Spread | None,
+        about("Standard deviation of the natural logarithm of lognormal block volumes.", "-"),
+    ] = None
+    volumes: Annotated[
+        tuple[Volume, ...] | None,
+        about(
+            "Surveyed volumes of blocks, rising, in place of `volume` and the power law. They go "
+            "with `volume_shares`.",
+            "m3",
+        ),
+    ] = None
+    volume_shares: Annotated[
+        tuple[Portion, ...] | None,
+        about(
+            "Share of blocks below each of `volumes`, from 0 to 1. Between two of them, the share "
+            "grows with the logarithm of the volume.",
+            "-",
+        ),
+    ] = None
     return_period: Annotated[
         Period | None,
         about(
@@ -246,6 +276,10 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         fields.check(self, f"{self.words}.")
         _set = msgspec.structs.force_setattr
         _set(self, "rate", self._yearly())
+        self._check_volumes()
+        if self.volumes:
+            ends = self.volumes[0], self.volumes[-1]
+            _set(self, "area", (ends[0] ** VOLUME_EXPONENT, ends[1] ** VOLUME_EXPONENT))
         if self.volume is not None:
             if self.area is not None:
                 mend = "leave it out: the event gives its area, too"
@@ -254,6 +288,48 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             _set(self, "area", (low, high))
         for name in ("volume", "return_period", "section_length"):
             _set(self, name, None)
+
+    def _check_volumes(self) -> None:
+        """Check that a distribution of volumes is complete and the only one."""
+        where, lognormal = self.words, (self.volume_median, self.volume_spread)
+        if self.volumes is not None or self.volume_shares is not None:
+            mend = "leave it out: the event gives volumes and volume_shares"
+            for name in ("volume", "volume_median", "volume_spread"):
+                if getattr(self, name) is not None:
+                    raise BadInput(f"{where}.{name}", getattr(self, name), mend)
+            volumes, shares = self.volumes or (), self.volume_shares or ()
+            if len(volumes) < 2 or any(a >= b for a, b in pairwise(volumes)):
+                raise BadInput(f"{where}.volumes", volumes, "give at least two volumes, rising")
+            rising = all(a < b for a, b in pairwise(shares))
+            if len(shares) != len(volumes) or not rising or (shares[0], shares[-1]) != (0.0, 1.0):
+                told = f"give {len(volumes)} shares below the volumes, rising from 0 to 1"
+                raise BadInput(f"{where}.volume_shares", shares, told)
+            ends = volumes[0] ** VOLUME_EXPONENT, volumes[-1] ** VOLUME_EXPONENT
+            if self.area not in (None, ends):
+                raise BadInput(f"{where}.area", self.area, mend)
+        elif lognormal != (None, None):
+            missing = "volume_spread" if self.volume_spread is None else "volume_median"
+            if None in lognormal:
+                mend = "give both volume_median and volume_spread"
+                raise BadInput(f"{where}.{missing}", None, mend)
+            limits = self.volume_limits
+            if limits is None:
+                mend = "give the least and the greatest volume, to which lognormal volumes are cut"
+                raise BadInput(f"{where}.volume", None, mend)
+            assert self.volume_median is not None
+            if not limits[0] <= self.volume_median <= limits[1]:
+                mend = f"give a median within the limits, {limits[0]:.3g} to {limits[1]:.3g} m3"
+                raise BadInput(f"{where}.volume_median", self.volume_median, mend)
+
+    @property
+    def volume_limits(self) -> tuple[float, float] | None:
+        """Least and greatest volume of a block [m3]; None if its source determines them."""
+        if self.volume is not None:
+            return self.volume
+        if self.area is None:
+            return None
+        low, high = (area ** (1.0 / VOLUME_EXPONENT) for area in self.area)
+        return low, high
 
     def _yearly(self) -> float:
         """Return its rate, as given or by its return period [1/year per 100 m of slope]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import msgspec
 import numpy as np
@@ -36,6 +36,25 @@ Edge = Annotated[float, about(ge=0.01, le=30.0)]
 Corners = Annotated[int, about(ge=4, le=12)]
 Ratio = Annotated[float, about(ge=1.0, le=4.0)]
 Speed = Annotated[float, about(ge=0.0, le=50.0)]
+
+
+class Shape(NamedTuple):
+    """Outline of blocks: ranges of the number of corners and of length over breadth."""
+
+    corners: tuple[int, int]
+    aspect: tuple[float, float]
+
+
+SHAPES = {
+    "cube": Shape((4, 4), (1.0, 1.2)),
+    "prism": Shape((4, 6), (1.5, 2.5)),
+    "slab": Shape((4, 6), (2.5, 4.0)),
+    "disc": Shape((9, 12), (1.0, 1.2)),
+}
+"""Shapes of blocks by name, as they are seen along the road."""
+
+USUAL = Shape((5, 8), (1.0, 1.5))
+"""Outline of blocks without a named shape."""
 
 
 @documented
@@ -109,17 +128,25 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     corners: Annotated[
         tuple[Corners, Corners],
         about("Least and greatest number of corners of a block of a band.", "-", rising=True),
-    ] = (5, 8)
+    ] = USUAL.corners
     aspect: Annotated[
         tuple[Ratio, Ratio],
         about("Least and greatest length over breadth of a block of a band.", "-", rising=True),
-    ] = (1.0, 1.5)
+    ] = USUAL.aspect
     edges: Annotated[
         tuple[Edge, Edge, Edge] | None,
         about(
             "Edges of the box around a measured block of a band, instead of `aspect` and the "
             "`area` of events. Each release uses one of the three faces of the box at random.",
             "m",
+        ),
+    ] = None
+    shape: Annotated[
+        str | None,
+        about(
+            "Shape of the blocks of a band by name, in place of `corners` and `aspect`, of which "
+            "those that are given keep their values. `Site.save` writes these two.",
+            choices=SHAPES,
         ),
     ] = None
     spin: Annotated[
@@ -144,6 +171,14 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         where = self.words
         fields.check(self, f"{where}.")
+        if self.shape is not None:
+            if self.band is None or self.edges is not None:
+                mend = "leave it out: only blocks of a band without edges have a shape"
+                raise BadInput(f"{where}.shape", self.shape, mend)
+            for name in ("corners", "aspect"):
+                if getattr(self, name) == getattr(USUAL, name):
+                    msgspec.structs.force_setattr(self, name, getattr(SHAPES[self.shape], name))
+            msgspec.structs.force_setattr(self, "shape", None)
         if self.edges is not None:
             if self.band is None:
                 mend = "leave it out: only blocks of a band have edges"

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from rigdda import BadInput, Ditch, Fence, Site
 from rigdda.agents.barrier_checks import check_layout
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.reports.headline import Answer, FailedCheck, headline
+from rigdda.agents.reports.headline import DesignAnswer, FailedCheck, headline
 from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.barrier_formulas import checks_of
 from rigdda.envs.environments import BarrierDesign
@@ -103,8 +103,8 @@ def test_an_existing_barrier_outside_the_zone_is_checked() -> None:
     assert [c.check for c in check_layout(stands, ()).failed][:2] == ["energy", "height"]
 
 
-def answer(**values: object) -> Answer:
-    usual = Answer("ditch at x = 9", "without barriers", (80.0, 70.0, 90.0),
+def answer(**values: object) -> DesignAnswer:
+    usual = DesignAnswer("ditch at x = 9", "without barriers", (80.0, 70.0, 90.0),
                    (100.0, 95.0, 105.0), None, "rock arrives in 5 %", True, ())  # fmt: skip
     return usual._replace(**values)
 

@@ -34,6 +34,7 @@ from rigdda.model.joints import spaced_area
 from rigdda.model.site_tables import Origin
 from rigdda.model.soundness import BEYOND
 from rigdda.model.surface import PLAIN
+from rigdda.model.survey import spike_words, spikes
 from rigdda.releases import Batch
 
 if TYPE_CHECKING:
@@ -452,6 +453,8 @@ def _odd_profile(site: Site) -> Iterator[str]:
             f"slope.points: the crest is {tall:g} m above the road; are the coordinates in metres, "
             "not in millimetres or feet?"
         )
+    for k, height in spikes(np.column_stack([x, y])):
+        yield f"slope.points[{k}] = [{x[k]:g}, {y[k]:g}]: {spike_words(height)}"
     if wide > WIDE or wide < NARROW:
         yield f"road: it is {wide:g} m wide; are chainages in metres, not in feet or kilometres?"
     above = site.profile.height(toe) - foot

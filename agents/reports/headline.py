@@ -12,6 +12,10 @@ Money = tuple[float, float, float]
 """Z with the ends of its 95 % interval [EUR per metre and year]."""
 
 
+MANY = 1000.0
+"""Utilisation above which its value says no more; one without any capacity is infinite [-]."""
+
+
 class FailedCheck(NamedTuple):
     """A check that is not met: barrier and check in words, and demand over capacity [-]."""
 
@@ -109,4 +113,6 @@ def is_existing(failed: FailedCheck) -> bool:
 
 def _times(use: float) -> str:
     """Return a utilisation with two decimals below 10, and in whole above."""
+    if use > MANY:
+        return f"more than {MANY:,.0f}"
     return f"{use:.2f}" if use < 9.995 else f"{use:,.0f}"

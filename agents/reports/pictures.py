@@ -181,7 +181,12 @@ EVENTS = ("#0072b2", "#d0312d", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7b
 """Colours of events, chosen to be distinguishable with colour blindness as far as possible."""
 
 MARKERS = ("o", "^", "s", "D", "P", "X")
-FONT: dict[Any, Any] = {"font.size": 11, "axes.spines.top": False, "axes.spines.right": False}
+FONT: dict[Any, Any] = {
+    "font.size": 11,
+    "text.parse_math": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+}
 DPI = 120
 
 SHEDS = 1.6

@@ -594,6 +594,16 @@ def test_coordinates_in_other_units_look_odd(slope):
     assert any("not in feet" in line for line in oddities(wide))
 
 
+def test_a_point_far_from_both_neighbours_looks_odd(slope):
+    points = list(slope.slope.points)
+    x, y = points[3]
+    points[3] = (x, y - 36.0)
+    pit = replace(slope, slope=replace(slope.slope, points=tuple(points)))
+    told = [line for line in oddities(pit) if "typing error" in line]
+    assert len(told) == 1 and told[0].startswith(f"slope.points[3] = [{x:g}, {y - 36.0:g}]")
+    assert "below both of its neighbours" in told[0]
+
+
 def test_rock_in_mid_air_looks_odd(slope):
     square = np.array([[14.0, 0.0], [16.0, 0.0], [16.0, 2.0], [14.0, 2.0]])
     for lift, odd in ((0.001, False), (3.0, True)):

@@ -267,6 +267,8 @@ def compliance(done: DesignStudy) -> str:
         cost = f"it is not shown that meeting the checks costs anything ({euros(more)})"
     failed = failed_checks(other.checks)
     fails = f"it fails its checks ({failed_words(failed)}); " if failed else ""
+    if RANK[free.targets] > RANK[chosen.targets]:
+        fails += f"its targets are {free.targets}; "
     return f"{words}; {fails}{money}: {cost}"
 
 

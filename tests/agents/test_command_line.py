@@ -107,7 +107,7 @@ def test_every_file_of_a_design_is_there_and_sound(designed: tuple[Path, str]) -
     assert [row["stage"] for row in table[-4:]] == 4 * ["verification"]
     assert json.loads(table[-1]["barriers"]) == to_tables(layout)
     assert json.loads(table[-4]["barriers"]) == []
-    assert int(table[-1]["simulations"]) <= 400
+    assert int(table[-1]["simulations"]) <= 600  # of both searches
     for row in table:
         z, low, high, capital, harm, repair, _ = (float(row[name]) for name in NUMBERS)
         assert z == pytest.approx(capital + harm + repair)

@@ -52,7 +52,7 @@ def test_a_design_that_stops_keeps_its_evaluations_and_goes_on(
     from rigdda.envs import DesignProblem
 
     options = ["--designer", "random", "--budget", "40", "--verify", "12"]
-    options += ["--ground-samples", "0"]
+    options += ["--ground-samples", "0", "--checks", "reported"]
     arguments = ["design", "chute.toml", *options, "--out", "o"]
     whole, left = DesignProblem.evaluate, [3]
 

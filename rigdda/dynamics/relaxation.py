@@ -1020,7 +1020,8 @@ def relax(
         ledger[2] += fade(rows.slot, n, 0.5 * h)
         if bouncing:
             following = shortest if alone else h
-            sweeps += rebound(rows, n, count, number, following, reach, tolerance, touch)
+            room = math.inf if fenced else reach  # blows of a group on a plate stay as they are
+            sweeps += rebound(rows, n, count, number, following, room, tolerance, touch)
             ledger[1] -= stop_uphill(rows.slot, n)
         struck, last, left = struck or hit, h, left - h if h < left else 0.0
         number += 0 if alone else 1

@@ -609,41 +609,13 @@ def aim_rebound(rows: Rows, n: int, count: int, number: int, share: float) -> No
 
 
 @kernel
-def start_rebound(
-    rows: Rows, count: int, number: int, h: float, reach: float, touch: float
-) -> None:  # fmt: skip
-    """Keep the impulses of the contacts before a rebound, and set what they may do in it.
-
-    A spring keeps its impulse. Between bodies that move, open contacts with restitution may close
-    at any speed, as the next substep finds their impacts: they would lose their restitution if they
-    were slowed to what their gap permits.
-    """
-    for k in range(count):
-        if rows.idle[k] > number:
-            continue
-        i, j = rows.row_i[k], rows.row_j[k]
-        row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
-        place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
-        aim_row(row, fact, a, b, h, h, touch)
-        fact[LOAD], fact[LOAD + 1] = row[IMPULSE], row[IMPULSE + 1]
-        fact[LOAD + 2] = row[ROLLED]
-        open_ = row[GAP] > touch and fact[STRENGTH + 1] == 0.0
-        if open_ and fact[RESTITUTION] > 0.0 and reach < math.inf:
-            row[AIM] = min(row[AIM], -reach)
-        if row[STIFFNESS] > 0.0:
-            row[KEEP] = row[KEEP_SHEAR] = 1.0
-            row[GAIN] = row[GAIN_SHEAR] = 0.0
-
-
-@kernel
 def rebound(
     rows: Rows, n: int, count: int, number: int, h: float, reach: float, tolerance: float,
     touch: float,
 ) -> int:  # fmt: skip
     """Open all contacts with an impact at the end of the substep; return the number of sweeps.
 
-    `h` is the least length of the next substep [s], within which open contacts may close, see
-    `start_rebound`.
+    `h` is the least length of the next substep [s], within which open contacts may close.
 
     Restitution with friction can increase the kinetic energy in an eccentric impact. A plastic
     impact, which did the work `lost` < 0 [J], cannot. Energy is quadratic in the velocities, so the
@@ -654,7 +626,17 @@ def rebound(
     for s in range(n):
         for q in range(3):
             rows.slot[s, BEFORE + q] = rows.slot[s, NOW + q]
-    start_rebound(rows, count, number, h, reach, touch)
+    for k in range(count):
+        if rows.idle[k] <= number:
+            i, j = rows.row_i[k], rows.row_j[k]
+            row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
+            place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
+            aim_row(row, fact, a, b, h, h, touch)
+            fact[LOAD], fact[LOAD + 1] = row[IMPULSE], row[IMPULSE + 1]
+            fact[LOAD + 2] = row[ROLLED]
+            if row[STIFFNESS] > 0.0:  # a spring keeps its impulse during the rebound
+                row[KEEP] = row[KEEP_SHEAR] = 1.0
+                row[GAIN] = row[GAIN_SHEAR] = 0.0
     sweeps, share = 0, 1.0
     for attempt in range(3):
         aim_rebound(rows, n, count, number, share)
@@ -1020,8 +1002,7 @@ def relax(
         ledger[2] += fade(rows.slot, n, 0.5 * h)
         if bouncing:
             following = shortest if alone else h
-            room = math.inf if fenced else reach  # blows of a group on a plate stay as they are
-            sweeps += rebound(rows, n, count, number, following, room, tolerance, touch)
+            sweeps += rebound(rows, n, count, number, following, reach, tolerance, touch)
             ledger[1] -= stop_uphill(rows.slot, n)
         struck, last, left = struck or hit, h, left - h if h < left else 0.0
         number += 0 if alone else 1

@@ -350,7 +350,7 @@ def test_the_work_taken_from_a_group_is_the_energy_it_lost(dt):
         assert open_ledger(sim, had) == pytest.approx(0.0, abs=1e-9 * had), seed
         absorbed = float(sim.loop.arrays.monitors.target["absorbed"][0])
         braked = fence.braking_force * (sim.barrier_poses[0, 0] - place)
-        assert braked * (1.0 - 1e-9) <= absorbed < 1.4 * braked, seed
+        assert braked * (1.0 - 1e-9) <= absorbed < 1.25 * braked, seed
 
 
 # what lies against it

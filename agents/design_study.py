@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rigdda import Site
 from rigdda.agents.barrier_checks import LayoutChecks
@@ -37,22 +37,6 @@ class VerifiedLayout:
 
 
 @dataclass(frozen=True, slots=True)
-class UncheckedLayout:
-    """A layout that was found without the condition that all checks are met.
-
-    Parameters
-    ----------
-    case : VerifiedLayout
-        The layout, verified.
-    checks : LayoutChecks
-        Its checks.
-    """
-
-    case: VerifiedLayout
-    checks: LayoutChecks
-
-
-@dataclass(frozen=True, slots=True)
 class ComparedLayouts:
     """Layouts of a design problem that are compared.
 
@@ -71,11 +55,6 @@ class ComparedLayouts:
     def nothing(self) -> VerifiedLayout:
         """The case without barriers."""
         return self.cases[0]
-
-    @property
-    def comparable(self) -> tuple[VerifiedLayout, ...]:
-        """The cases without the layout that was found without required checks."""
-        return tuple(case for case in self.cases if case.name != WITHOUT_CHECKS)
 
     @property
     def chosen(self) -> VerifiedLayout:
@@ -105,8 +84,8 @@ class DesignStudy(ComparedLayouts):
         P(reach) among all that were evaluated.
     replaced : bool
         Whether the layout found is one of the frontier, which is better than that of the designer.
-    unchecked : UncheckedLayout or None
-        If checks are required: the layout that the designer finds without this condition.
+    other_checks : dict of str to LayoutChecks
+        If checks are required: the checks of the other cases, by their names.
     """
 
     result: DesignResult
@@ -115,7 +94,18 @@ class DesignStudy(ComparedLayouts):
     checks: LayoutChecks
     frontier: tuple[TriedLayout, ...] = ()
     replaced: bool = False
-    unchecked: UncheckedLayout | None = None
+    other_checks: dict[str, LayoutChecks] = field(default_factory=dict)
+
+    @property
+    def comparable(self) -> tuple[VerifiedLayout, ...]:
+        """The cases that may be proposed: if checks are required, those that meet them."""
+        failed = {name for name, checks in self.other_checks.items() if not checks.satisfied}
+        return tuple(case for case in self.cases if case.name not in failed)
+
+    @property
+    def unchecked(self) -> VerifiedLayout | None:
+        """The case that was found without required checks, if it differs from the last."""
+        return next((case for case in self.cases if case.name == WITHOUT_CHECKS), None)
 
 
 def design_events(site: Site) -> tuple[str, ...]:

@@ -24,7 +24,6 @@ from rigdda.agents.design_study import (
     NOTHING,
     WITHOUT_CHECKS,
     DesignStudy,
-    UncheckedLayout,
     VerifiedLayout,
     design_events,
 )
@@ -35,6 +34,7 @@ from rigdda.agents.designers.protocol import (
     CHOICE,
     DesignResult,
     Entry,
+    Progress,
     best_of_finals,
     final_score,
     release_seeds,
@@ -178,59 +178,43 @@ def study(
     tick(0, "simulating releases without barriers")
     front: tuple[TriedLayout, ...] = ()
     replaced = False
+    free = problem.with_checks("reported")  # in which all layouts can be compared
     with EvaluationsFile(out / "evaluations.csv", problem.site) as file:
-        begun = 0  # releases of searches that are finished
 
         def progress(entry: Entry) -> None:
             file.add(entry)
-            tick(begun + entry.simulations, f"{name}: {entry.stage}")
+            tick(entry.simulations, f"{name}: {entry.stage}")
 
-        search = designers.module(name).design
-        result = search(problem, simulations, seed, progress, store)
-        free = problem.with_checks("reported")  # in which all layouts can be compared
-        unchecked = None
-        if problem.checks == "required" and name not in SEARCHLESS:
-            begun = simulations
-            tick(begun, "searching without required checks")
-            more = search_budget(problem, name, simulations) - simulations
-            unchecked = search(free, more, seed, progress, store)
-            both = result.simulations + unchecked.simulations
-            if _is_better(free, unchecked, result):
-                result, unchecked = unchecked, None
-            result = replace(result, simulations=both)
-        begun = search_budget(problem, name, simulations)
-        rule = answer(free)
+        def check(layout: Layout, stage: str) -> Evaluation:
+            stream = CHOICE if stage == "frontier" else stage
+            evaluation = verify(free, layout, releases, seed, store, stream)
+            file.add(Entry(result.simulations, stage, evaluation))
+            return evaluation
+
+        result, unchecked = _searched(problem, name, simulations, seed, progress, store)
+        begun, rule = search_budget(problem, name, simulations), answer(free)
         cases: list[VerifiedLayout] = []
-        for case, layout in _compared(problem, name, result, rule, unchecked):
+        for case, layout in _compared(free, name, result, rule, unchecked):
             tick(begun + releases * len(cases), f"verifying: {case}")
-            evaluation = verify(free, layout, releases, seed, store)
-            file.add(Entry(result.simulations, "verification", evaluation))
-            cases.append(VerifiedLayout(case, evaluation))
+            cases.append(VerifiedLayout(case, check(layout, "verification")))
         if cases[-1].evaluation.targets == MISSED and design_events(problem.site):
             tick(begun + releases * len(cases), "verifying the frontier")
-
-            def check(layout: Layout, stage: str) -> Evaluation:
-                stream = CHOICE if stage == "frontier" else stage
-                evaluation = verify(free, layout, releases, seed, store, stream)
-                file.add(Entry(result.simulations, stage, evaluation))
-                return evaluation
-
             searched = name not in SEARCHLESS
             result, front, replaced = with_frontier(problem, result, cases, check, searched)
     tick(begun + releases * len(cases), "analysing the remaining risk, checking barriers")
-    left = _left(free, [case.evaluation for case in cases], result.tried, seed)
     layouts = [(case.name, case.evaluation.layout) for case in cases]
     archive.write(out / archive.FILE, archive.archive(problem, seed, layouts, store))
+    others = layouts[:-1] if problem.checks == "required" else []
     done = DesignStudy(
         problem=problem,
         cases=tuple(cases),
         result=result,
-        left=left,
+        left=_left(free, [case.evaluation for case in cases], result.tried, seed),
         rule=rule,
         checks=check_layout(free, cases[-1].evaluation.layout),
         frontier=front,
         replaced=replaced,
-        unchecked=_unchecked(free, cases),
+        other_checks={case: check_layout(free, layout) for case, layout in others},
     )
     return done, store
 
@@ -246,22 +230,37 @@ def search_budget(problem: DesignProblem, name: str, simulations: int) -> int:
     return simulations + max(2, int(UNCHECKED * simulations))
 
 
-def _is_better(free: DesignProblem, unchecked: DesignResult, result: DesignResult) -> bool:
-    """Return whether a layout that was found without required checks meets them and is better.
+def _searched(
+    problem: DesignProblem,
+    name: str,
+    simulations: int,
+    seed: int,
+    progress: Progress,
+    store: Store,
+) -> tuple[DesignResult, DesignResult | None]:
+    """Return the results of a designer with and, if checks are required, without this condition.
 
-    A barrier may meet its checks below another one although it would not on its own.
+    A layout of the second search that meets its checks is the first result if it is better: a
+    barrier may meet them below another one although it would not on its own. The first result has
+    the releases of both searches.
     """
-    if final_score(free, unchecked.evaluation) >= final_score(free, result.evaluation):
-        return False
-    return check_layout(free, unchecked.layout).satisfied
+    search = designers.module(name).design
+    result = search(problem, simulations, seed, progress, store)
+    more = search_budget(problem, name, simulations) - simulations
+    if more == 0:
+        return result, None
 
+    def go_on(entry: Entry) -> None:
+        progress(replace(entry, simulations=entry.simulations + simulations))
 
-def _unchecked(free: DesignProblem, cases: Sequence[VerifiedLayout]) -> UncheckedLayout | None:
-    """Return the layout that was found without required checks, if there is one among the cases."""
-    for case in cases:
-        if case.name == WITHOUT_CHECKS:
-            return UncheckedLayout(case, check_layout(free, case.evaluation.layout))
-    return None
+    free = problem.with_checks("reported")
+    unchecked: DesignResult | None = search(free, more, seed, go_on, store)
+    assert unchecked is not None
+    both = result.simulations + unchecked.simulations
+    better = final_score(free, unchecked.evaluation) < final_score(free, result.evaluation)
+    if better and check_layout(free, unchecked.layout).satisfied:
+        result, unchecked = replace(unchecked, tried=result.tried), None
+    return replace(result, simulations=both), unchecked
 
 
 SEARCHLESS = ("rule", "constant")
@@ -302,8 +301,9 @@ def with_frontier(
     result, front = replace(result, tried=known), frontier(known)
     if not searched:
         return result, front, False
-    layouts = [case.evaluation.layout for case in cases]
+    layouts = [c.evaluation.layout for c in cases[:-1] if problem.fits(c.evaluation.layout)]
     layouts += [one.layout for one in front if one.verified is not None]
+    layouts.append(cases[-1].evaluation.layout)
     seen = [judged(layout) for layout in dict.fromkeys(layouts)]
     best = best_of_finals(problem, seen).layout
     if best == result.layout:

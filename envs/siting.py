@@ -45,6 +45,10 @@ MACHINE = 3.0
 this total width, uphill and downhill, must adjoin the works."""
 
 
+MOST_KNOWN = 10_000
+"""Number of barriers whose first failed check is remembered; a training tries many more."""
+
+
 class Rules:
     """Rules for layouts on a site.
 
@@ -253,6 +257,8 @@ class Rules:
     def _failed_checks(self, where: str, barrier: Barrier) -> Iterator[BadInput]:
         """Yield an error if a barrier fails a check of its kind."""
         if barrier not in self._failed:
+            if len(self._failed) >= MOST_KNOWN:
+                self._failed.clear()
             demand = demand_at(self._envelope, self.site.rule, barrier.x)
             found = checks_of(self.site, barrier, demand)
             self._failed[barrier] = next((c for c in found if not c.satisfied), None)

@@ -239,6 +239,7 @@ def of_design(done: DesignStudy) -> list[str]:
     cases = [(case.name, case.evaluation) for case in done.comparable]
     lines = [
         compliance(done),
+        *for_comparison(done),
         limits(done.result, cases, done.left),
         *cheaper(cases),
         *failing(done.problem.site, chosen),
@@ -254,22 +255,32 @@ def compliance(done: DesignStudy) -> str:
     other, chosen = done.unchecked, done.chosen.evaluation
     if other is None:
         return "checks are required, which costs nothing: no better layout was found without them"
-    free = other.case.evaluation
-    built = "; ".join(order(barrier, done.problem.site) for barrier in free.layout)
-    words = f"without required checks, the search finds: {built or 'no barrier'}"
-    more = chosen.objective - free.objective
-    money = (
-        f"Z is {euros(free.objective)} ({span(free.ci)}) with it and {euros(chosen.objective)} "
-        f"({span(chosen.ci)}) with the layout that meets them"
-    )
-    cost = f"meeting the checks costs {euros(more)} EUR per metre and year"
-    if free.ci[0] <= chosen.ci[1] and chosen.ci[0] <= free.ci[1]:
-        cost = f"it is not shown that meeting the checks costs anything ({euros(more)})"
-    failed = failed_checks(other.checks)
-    fails = f"it fails its checks ({failed_words(failed)}); " if failed else ""
+    free = other.evaluation
+    failed = failed_checks(done.other_checks[other.name])
+    faults = [f"fails its checks ({failed_words(failed)})"] if failed else []
     if RANK[free.targets] > RANK[chosen.targets]:
-        fails += f"its targets are {free.targets}; "
-    return f"{words}; {fails}{money}: {cost}"
+        faults.append(f"has targets that are {free.targets}")
+    built = " and ".join(f"{b.label} at x = {b.x:.1f} m" for b in free.layout) or "no barrier"
+    but = f", which {' and '.join(faults)}" if faults else ""
+    more = euros(chosen.objective - free.objective)
+    cost = f"meeting the checks costs {more} EUR per metre and year"
+    if free.ci[0] <= chosen.ci[1] and chosen.ci[0] <= free.ci[1]:
+        cost = f"it is not shown that meeting the checks costs anything ({more} EUR)"
+    return (
+        f"without required checks, the search finds {built}{but}: {cost}, as Z is "
+        f"{euros(chosen.objective)} ({span(chosen.ci)}) instead of {euros(free.objective)} "
+        f"({span(free.ci)})"
+    )
+
+
+def for_comparison(done: DesignStudy) -> list[str]:
+    """Return a line on the layouts for comparison that may not be proposed."""
+    kept = {case.name for case in (*done.comparable, *filter(None, [done.unchecked]))}
+    names = [repr(case.name) for case in done.cases if case.name not in kept]
+    if not names:
+        return []
+    fail = "fails a required check and is" if len(names) == 1 else "fail required checks and are"
+    return [f"{' and '.join(names)} {fail} shown for comparison only"]
 
 
 def failed_checks(checks: LayoutChecks) -> list[FailedCheck]:
@@ -277,6 +288,16 @@ def failed_checks(checks: LayoutChecks) -> list[FailedCheck]:
     return [
         FailedCheck(f"{c.barrier}, at {c.x:.1f} m", c.check, c.use / c.limit) for c in checks.failed
     ]
+
+
+def reaching(evaluation: Evaluation, site: Site) -> tuple[str, float]:
+    """Return the design event that most often reaches the road, and the share of its releases.
+
+    Without design events, the name is empty and the share 0.
+    """
+    shares = {name: evaluation.reach[name].probability for name in design_events(site)}
+    most = max(shares, key=lambda name: shares[name], default="")
+    return most, shares.get(most, 0.0)
 
 
 def answer(done: DesignStudy) -> DesignAnswer:
@@ -291,22 +312,25 @@ def answer(done: DesignStudy) -> DesignAnswer:
         asked=asked_words(done.problem.targets),
         required=done.problem.checks == "required",
         failed=failed_checks(done.checks),
+        reaching=reaching(chosen, site),
     )
 
 
 def asked_words(targets: Targets) -> str:
     """Return targets in words; empty without any."""
-    pairs = (
-        (targets.reach, "a block of a design event reaches the road"),
-        (targets.failure, "a barrier fails in a design event"),
-        (targets.individual, "a commuter is killed within a year"),
-    )
-    return " and that ".join(
-        f"{what} with a probability of at most "
-        + (f"{value:.2g}" if value is targets.individual else percent(value))
-        for value, what in pairs
-        if value is not None
-    )
+    parts = []
+    if targets.reach is not None:
+        chance = percentage(targets.reach)
+        parts.append(
+            f"a block of a design event reaches the road with a probability of at most {chance}"
+        )
+    if targets.failure is not None:
+        chance = percentage(targets.failure)
+        parts.append(f"a barrier fails in a design event with a probability of at most {chance}")
+    if targets.individual is not None:
+        chance = f"{targets.individual:.2g}"
+        parts.append(f"a commuter is killed within a year with a probability of at most {chance}")
+    return " and that ".join(parts)
 
 
 def left_over(evaluation: Evaluation) -> str:

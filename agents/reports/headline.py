@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 from typing import NamedTuple
 
-from rigdda.agents.reports.wording import euros
+from rigdda.agents.reports.wording import euros, percent
 from rigdda.envs.problem import MET, MISSED
 
 Money = tuple[float, float, float]
 """Z with the ends of its 95 % interval [EUR per metre and year]."""
 
+
+OFTEN = 0.05
+"""Share of the releases of a design event that reach the road from which it is told [-]."""
 
 MANY = 1000.0
 """Utilisation above which its value says no more; one without any capacity is infinite [-]."""
@@ -43,6 +47,9 @@ class DesignAnswer(NamedTuple):
         Whether all checks had to be met.
     failed : sequence of FailedCheck
         Checks that the layout does not meet.
+    reaching : (str, float)
+        The design event that most often reaches the road with the layout, empty without design
+        events, and the share of its releases that do [-].
     """
 
     layout: str
@@ -53,6 +60,7 @@ class DesignAnswer(NamedTuple):
     asked: str
     required: bool
     failed: Sequence[FailedCheck]
+    reaching: tuple[str, float]
 
 
 def headline(answer: DesignAnswer) -> str:
@@ -87,7 +95,7 @@ def headline(answer: DesignAnswer) -> str:
         if answer.targets == MET:
             return (
                 f"Build, for the target alone: {layout}. It costs {euros(more)} EUR per metre and "
-                f"year more than {answer.bare}."
+                f"year more than {answer.bare}.{_left(answer)}"
             )
         return (
             f"Build nothing: the best layout that was found costs {euros(more)} EUR per metre and "
@@ -98,12 +106,24 @@ def headline(answer: DesignAnswer) -> str:
             f"Verify with more releases before you build: {layout}. It is not shown that it saves "
             "more than it costs."
         )
-    return f"Build: {layout}."
+    return f"Build: {layout}.{_left(answer)}"
+
+
+def _left(answer: DesignAnswer) -> str:
+    """Return a sentence on how often rock still reaches the road; empty if it hardly does."""
+    event, share = answer.reaching
+    if share < OFTEN:
+        return ""
+    return f" Rock of {event!r} still reaches the road in {percent(share)} of the releases."
 
 
 def failed_words(failed: Sequence[FailedCheck]) -> str:
-    """Return checks that are not met in words, with their utilisation."""
-    return "; ".join(f"{one.barrier}, {one.check} used {_times(one.use)} times" for one in failed)
+    """Return the barriers with checks that are not met in words, with their utilisation."""
+    words = []
+    for barrier, group in groupby(failed, key=lambda one: one.barrier):
+        uses = " and ".join(f"{one.check} {_times(one.use)}" for one in group)
+        words.append(f"{barrier}: {uses} times the limit")
+    return "; ".join(words)
 
 
 def is_existing(failed: FailedCheck) -> bool:

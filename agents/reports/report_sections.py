@@ -36,11 +36,11 @@ from rigdda.agents.reports.wording import (
     figure,
     order,
     percent,
-    percentage,
     small,
     span,
 )
 from rigdda.agents.run_record import RunRecord
+from rigdda.envs.problem import Targets
 
 Folders = Sequence[ResultsFolder]
 
@@ -178,28 +178,28 @@ def _answer(folder: ResultsFolder, chosen: Row, nothing: Row) -> DesignAnswer:
         asked=_asked(folder),
         required=options.get("checks") == "required",
         failed=failed,
+        reaching=_reaching(folder, chosen["layout"]),
     )
 
 
 def _asked(folder: ResultsFolder) -> str:
     """Return the targets of a design in words."""
     options = folder.records["design"].options
-    pairs = (
-        ("target", "a block of a design event reaches the road"),
-        ("failure", "a barrier fails in a design event"),
-        ("target_risk", "a commuter is killed within a year"),
+    return findings.asked_words(
+        Targets(options.get("target"), options.get("failure"), options.get("target_risk"))
     )
-    said = [
-        f"{what} with a probability of at most {_limit(name, float(options[name]))}"
-        for name, what in pairs
-        if options.get(name) is not None
-    ]
-    return " and that ".join(said)
 
 
-def _limit(name: str, value: float) -> str:
-    """Return the value of a target as text."""
-    return f"{value:.6g}" if name == "target_risk" else percentage(value)
+def _reaching(folder: ResultsFolder, layout: str) -> tuple[str, float]:
+    """Return the design event that most often reaches the road with a layout, and how often [-]."""
+    _, rows = folder.table("chances.csv") if folder.files("chances.csv") else ([], [])
+    own = {
+        row["event"]: float(row["reach"])
+        for row in rows
+        if row["layout"] == layout and row["design"] == "True"
+    }
+    most = max(own, key=lambda name: own[name], default="")
+    return most, own.get(most, 0.0)
 
 
 def _money_of(row: Row) -> str:

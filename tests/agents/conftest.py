@@ -22,7 +22,12 @@ def problem(site: Site) -> DesignProblem:
 
 
 @pytest.fixture
-def valley(site: Site, monkeypatch: pytest.MonkeyPatch) -> Valley:
-    monkeypatch.setattr("rigdda.agents.designers.catalogue.ensemble", seen)
+def few_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Release few blocks for design envelopes."""
     monkeypatch.setattr(design_envelope, "of", partial(design_envelope.of, blocks=60))
+
+
+@pytest.fixture
+def valley(site: Site, few_blocks: None, monkeypatch: pytest.MonkeyPatch) -> Valley:
+    monkeypatch.setattr("rigdda.agents.designers.catalogue.ensemble", seen)
     return Valley(site)

@@ -26,15 +26,7 @@ def problem() -> DesignProblem:
     return DesignProblem("verge", kinds=KINDS)
 
 
-@pytest.fixture(autouse=True)
-def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Release few blocks."""
-    usual = design_envelope.of
-
-    def of(site, zone, seed=0, blocks=60, layout=()):  # type: ignore[no-untyped-def]
-        return usual(site, zone, seed, blocks, layout)
-
-    monkeypatch.setattr(design_envelope, "of", of)
+pytestmark = pytest.mark.usefixtures("few_blocks")
 
 
 def own(checks: LayoutChecks, kind: str) -> dict[str, BarrierCheck]:
@@ -142,9 +134,8 @@ def test_the_rule_and_the_checks_agree_behind_an_existing_fence() -> None:
         problem = DesignProblem(msgspec.structs.replace(site, existing=(old,)), kinds=KINDS)
         found = rule.answer(problem)
         assert found.name == rule.NAME and found.check is not None
-        sheets = check_layout(problem, found.layout).fences
-        assert len(sheets) == (1 if removable and found.layout[0].x < 19.0 else 2)
-        sheet = next(s for s in sheets if s.fence == found.layout[0])
+        sheets = {sheet.fence: sheet for sheet in check_layout(problem, found.layout).fences}
+        sheet = sheets[found.layout[0]]
         assert sheet.uses == pytest.approx(found.check.uses)
 
 

@@ -16,16 +16,7 @@ from rigdda.envs.environments import BarrierDesign
 from rigdda.envs.fence_checks import demand_at
 from rigdda.model.existing import Existing
 
-
-@pytest.fixture(autouse=True)
-def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Release few blocks."""
-    usual = design_envelope.of
-
-    def of(site, zone, seed=0, blocks=60, layout=()):  # type: ignore[no-untyped-def]
-        return usual(site, zone, seed, blocks, layout)
-
-    monkeypatch.setattr(design_envelope, "of", of)
+pytestmark = pytest.mark.usefixtures("few_blocks")
 
 
 @pytest.fixture
@@ -103,10 +94,21 @@ def test_an_existing_barrier_outside_the_zone_is_checked() -> None:
     assert [c.check for c in check_layout(stands, ()).failed][:2] == ["energy", "height"]
 
 
+USUAL = DesignAnswer(
+    layout="ditch at x = 9",
+    bare="without barriers",
+    z=(80.0, 70.0, 90.0),
+    nothing=(100.0, 95.0, 105.0),
+    targets=None,
+    asked="rock arrives with a probability of at most 5 %",
+    required=True,
+    failed=(),
+    reaching=("", 0.0),
+)
+
+
 def answer(**values: object) -> DesignAnswer:
-    usual = DesignAnswer("ditch at x = 9", "without barriers", (80.0, 70.0, 90.0),
-                   (100.0, 95.0, 105.0), None, "rock arrives in 5 %", True, ())  # fmt: skip
-    return usual._replace(**values)
+    return USUAL._replace(**values)
 
 
 ENERGY = FailedCheck("fence 1,000 kJ, at 9.0 m", "energy", 1.26)
@@ -138,7 +140,17 @@ def test_the_first_line_of_a_design(values: dict, words: str) -> None:
     line = headline(answer(**values))
     assert line.startswith(words), line
     if "failed" in values and ENERGY in values["failed"]:
-        assert "fence 1,000 kJ, at 9.0 m, energy used 1.26 times" in line
+        both = " and height 4.00" if HEIGHT in values["failed"] else ""
+        assert f"fence 1,000 kJ, at 9.0 m: energy 1.26{both} times the limit" in line
+
+
+def test_the_first_line_says_how_often_rock_still_arrives() -> None:
+    line = headline(answer(reaching=("large", 0.46)))
+    assert (
+        line
+        == "Build: ditch at x = 9. Rock of 'large' still reaches the road in 46 % of the releases."
+    )
+    assert headline(answer(reaching=("large", 0.01))) == "Build: ditch at x = 9."
 
 
 def test_ditches_are_compared_with_the_chart_where_no_block_passes(required: DesignProblem) -> None:

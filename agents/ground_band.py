@@ -49,11 +49,24 @@ State = Literal["cheapest", "undecided", "dearer"]
 
 
 class BandLayout(NamedTuple):
-    """A layout on one ground."""
+    """A layout on one ground.
+
+    Parameters
+    ----------
+    name : str
+        Name of the layout.
+    evaluation : Evaluation
+        Its evaluation on this ground.
+    priced : Priced
+        Its cost in each release.
+    comparable : bool
+        Whether it may be chosen; not if it fails a required check.
+    """
 
     name: str
     evaluation: Evaluation
     priced: Priced
+    comparable: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,8 +92,9 @@ class GroundSample:
 
     @property
     def cheapest(self) -> BandLayout:
-        """The layout with the least Z."""
-        return min(self.cases, key=lambda case: case.priced.objective)
+        """The layout with the least Z of those that may be chosen."""
+        own = [case for case in self.cases if case.comparable]
+        return min(own, key=lambda case: case.priced.objective)
 
     @property
     def state(self) -> State:
@@ -174,8 +188,9 @@ def assess(
 
     problem, asked = done.problem, inputs(done.problem.site, posterior)
     cube = qmc.LatinHypercube(len(asked), rng=np.random.default_rng(seed)).random(grounds)
-    layouts = [case.evaluation.layout for case in done.comparable]
-    names = [case.name for case in done.comparable]
+    compared = [case for case in done.cases if case is not done.unchecked]
+    comparable = {case.name for case in done.comparable}
+    layouts = [case.evaluation.layout for case in compared]
     seeds, events = _seeds(problem, seed), design_events(problem.site)
     samples = []
     for i, place in enumerate(cube):
@@ -185,7 +200,10 @@ def assess(
         found = simulate(site, layouts, seeds, out)
         pairs = zip(asked, place.tolist(), strict=True)
         values = {p: v for one, at in pairs for p, v in zip(one.paths, one.at(at), strict=True)}
-        cases = tuple(map(_case, names, [site] * len(names), layouts, found))
+        cases = tuple(
+            _case(case.name, site, layout, one)._replace(comparable=case.name in comparable)
+            for case, layout, one in zip(compared, layouts, found, strict=True)
+        )
         chosen = cases[-1].evaluation
         targets = problem.targets.state(events, chosen.reach, chosen.failure)
         samples.append(GroundSample(values, cases, found[0].strata, targets))

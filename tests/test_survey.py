@@ -269,8 +269,11 @@ def test_units_without_brackets_are_not_taken_for_metres(head):
 def test_units_in_a_row_of_their_own():
     rows = "0;92\n10;90\n161;0\n"
     assert len(parse_table("survey.csv", f"chainage;elevation\nm;m\n{rows}").points) == 3
-    with pytest.raises(BadInput, match="feet"):
-        parse_table("survey.csv", f"chainage;elevation\nm;ft\n{rows}")
+    coded = "code;chainage;elevation\n-;m;m\n" + "".join(f"P;{row}\n" for row in rows.split())
+    assert len(parse_table("survey.csv", coded).points) == 3
+    for unit, words in (("ft", "feet"), ("Fuss", "not known"), ("dm", "decimetres")):
+        with pytest.raises(BadInput, match=words):
+            parse_table("survey.csv", f"chainage;elevation\nm;{unit}\n{rows}")
     with pytest.raises(BadInput, match="feet"):
         parse_table("survey.csv", "0 ft;92 ft\n10;90\n161;0\n")
 
@@ -301,6 +304,7 @@ def test_the_first_row_of_a_table_without_names_is_kept(first):
         ("x;y\n0;1.892\n10,5;1.870\n161;1.804\n", "use one decimal sign"),
         ("x;y\n0;1.892,5\n10;1.870\n161;1.804\n", "separators of thousands"),
         ("x;y\n0+00;92\n0+10;90\n1+61;0\n", "kilometres and metres"),
+        ("x;y\n0+000;0+092\n0+010;0+090\n0+161;0+000\n", "elevation = '0+092'"),
         ("x;y\n1_20;92\n130;90\n161;0\n", "give a number"),
     ],
 )  # fmt: skip

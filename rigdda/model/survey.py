@@ -95,7 +95,15 @@ BACKWARD = 0.25
 """Share of the segments that may turn back: above it, rows are out of order."""
 
 OFF_LINE = 0.02
-"""Distance of a point from the line of the profile in plan, over its length, that is reported."""
+"""Distance of a point from the straight line between the ends of a profile in plan, over its
+length, above which chainage is measured along the points."""
+
+NAME_COLUMNS = (
+    "name its columns in the first line: chainage and elevation, or easting, northing and "
+    "elevation; distances along the slope and numbers of points are no chainages; with decimal "
+    "commas separate columns by semicolons"
+)
+"""What to do with a table whose columns are not understood."""
 
 MANY = 2000
 """Points of a profile above which simulations are slow."""
@@ -167,9 +175,7 @@ def parse_table(name: str, text: str) -> Survey:
     separator, rows = _rows(name, text)
     has_names = not any(map(_looks_numeric, rows[0][1]))
     head, body = (rows[0][1], rows[1:]) if has_names else ([], rows)
-    if body and has_names and _are_units(body[0][1]):
-        _check_units(name, *body[0])
-        body = body[1:]
+    units = body.pop(0) if body and has_names and _are_units(body[0][1]) else None
     for line, cells in body:
         if head and len(cells) > len(head) and any(cells[len(head) :]):
             mend = "name all columns in the first line; with decimal commas use semicolons"
@@ -177,6 +183,8 @@ def parse_table(name: str, text: str) -> Survey:
     if not body:
         raise BadInput(name, "no numbers", "give at least two rows of chainage and elevation [m]")
     columns = _named(name, rows[0]) if head else _unnamed(name, body)
+    if units is not None:
+        _check_units(name, *units, columns)
     _check_decimal_signs(name, separator, body, columns)
     values = np.array(
         [[_number(name, line, cells, what, at) for what, at in columns] for line, cells in body]
@@ -258,12 +266,19 @@ def _are_units(cells: Sequence[str]) -> bool:
     )
 
 
-def _check_units(name: str, line: int, cells: Sequence[str]) -> None:
-    """Check that a row of units names metres only."""
-    for cell in cells:
-        if (unit := _letters(cell)) in FOREIGN:
-            mend = f"give metres: the column is in {FOREIGN[unit]}"
-            raise BadInput(f"{name} line {line}", cell, mend)
+def _check_units(
+    name: str, line: int, cells: Sequence[str], columns: Sequence[tuple[str, int]]
+) -> None:
+    """Check that a row of units names no other unit than metres for the columns that are read."""
+    for _, at in columns:
+        unit = _letters(cells[at]) if at < len(cells) else ""
+        if unit and unit not in METRES:
+            raise BadInput(f"{name} line {line}", cells[at], f"give metres: {_in_words(unit)}")
+
+
+def _in_words(unit: str) -> str:
+    """Return what is wrong with a unit that is not metres."""
+    return f"the numbers are in {FOREIGN[unit]}" if unit in FOREIGN else "the unit is not known"
 
 
 def _named(name: str, row: tuple[int, list[str]]) -> list[tuple[str, int]]:
@@ -291,12 +306,7 @@ def _named(name: str, row: tuple[int, list[str]]) -> list[tuple[str, int]]:
             mend = f"keep one column of {what}, and delete or rename the others"
             raise BadInput(where, several, mend)
     if not all(used):
-        mend = (
-            "name its columns in the first line: chainage and elevation, or easting, northing and "
-            "elevation; distances along the slope and numbers of points are no chainages; with "
-            "decimal commas separate columns by semicolons"
-        )
-        raise BadInput(where, ", ".join(head), mend)
+        raise BadInput(where, ", ".join(head), NAME_COLUMNS)
     words = ("elevation", "chainage") if chainage else ("elevation", "easting", "northing")
     columns = [(word, found[0]) for word, found in zip(words, used, strict=True)]
     for _, at in columns:
@@ -313,12 +323,8 @@ def _unnamed(name: str, body: Sequence[tuple[int, list[str]]]) -> list[tuple[str
         if 2 * sum(_looks_numeric(cells[k]) for _, cells in body) > len(body)
     ]
     if len(numeric) != 2:
-        mend = (
-            "name its columns in the first line: chainage and elevation, or easting, northing and "
-            "elevation; with decimal commas separate columns by semicolons"
-        )
         found = f"{len(body[0][1])} columns without names"
-        raise BadInput(f"{name} line {body[0][0]}", found, mend)
+        raise BadInput(f"{name} line {body[0][0]}", found, NAME_COLUMNS)
     return [("chainage", numeric[0]), ("elevation", numeric[1])]
 
 
@@ -355,8 +361,7 @@ def _check_unit(where: str, cell: str) -> None:
     unit = _split_name(cell)[1]
     if unit is None or unit in METRES:
         return
-    what = f"the column is in {FOREIGN[unit]}" if unit in FOREIGN else "its unit is not known"
-    raise BadInput(where, cell, f"give metres, and write (m) after the name: {what}")
+    raise BadInput(where, cell, f"give metres, and write (m) after the name: {_in_words(unit)}")
 
 
 def _check_decimal_signs(
@@ -393,12 +398,11 @@ def _number(name: str, line: int, cells: Sequence[str], what: str, at: int) -> f
         raise BadInput(where, cell, "give a number in metres, or delete the line")
     text, unit = _plain(cell)
     if unit and unit not in METRES:
-        what = f"it is in {FOREIGN[unit]}" if unit in FOREIGN else "its unit is not known"
-        raise BadInput(where, cell, f"give a number in metres: {what}")
-    if found := STATION.fullmatch(text):
+        raise BadInput(where, cell, f"give a number in metres: {_in_words(unit)}")
+    if what == "chainage" and (found := STATION.fullmatch(text)):
         size = 1000.0 * float(found[2]) + float(found[3].replace(",", "."))
         return -size if found[1] == "-" else size
-    if re.fullmatch(r"[+-]?\d+\+[\d.,]+", text):
+    if what == "chainage" and re.fullmatch(r"[+-]?\d+\+[\d.,]+", text):
         mend = "write stations as kilometres and metres, such as 0+150, or in metres"
         raise BadInput(where, cell, mend)
     if not NUMBER.fullmatch(text):

@@ -38,7 +38,7 @@ from rigdda.dynamics.records import (
     Floats,
     Parameters,
 )
-from rigdda.dynamics.relaxation import relax, start_slots
+from rigdda.dynamics.relaxation import relax
 from rigdda.dynamics.rows import (
     BRAKE,
     COS,
@@ -58,6 +58,7 @@ from rigdda.dynamics.rows import (
     is_elastic,
     pack_rows,
 )
+from rigdda.dynamics.slots import start_slots
 from rigdda.kernel import inlined, kernel, stage
 
 

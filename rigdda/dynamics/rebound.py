@@ -1,0 +1,155 @@
+"""Rebound: contacts with an impact open at the end of a substep by restitution."""
+
+from __future__ import annotations
+
+from rigdda.dynamics.arrays import Rows
+from rigdda.dynamics.constants import (
+    ROUNDING,
+)
+from rigdda.dynamics.rows import (
+    AIM,
+    BEFORE,
+    BOUNCE,
+    FREE,
+    GAIN,
+    GAIN_SHEAR,
+    IMPULSE,
+    KEEP,
+    KEEP_SHEAR,
+    LOAD,
+    NORMAL,
+    NOW,
+    REBOUND,
+    ROLL,
+    ROLL_LIMIT,
+    ROLLED,
+    ROLLING,
+    SHEAR,
+    STIFFNESS,
+    TENSION,
+    along_six,
+    place_row,
+)
+from rigdda.dynamics.substep import aim_row, count_row
+from rigdda.dynamics.sweeps import settle
+from rigdda.kernel import kernel
+
+
+@kernel
+def work_from(rows: Rows, count: int, number: int, first: int) -> float:
+    """Return the work of contacts other than springs on instantaneous velocity changes [J].
+
+    `first` is the column of the slots with the velocities before. A contact that has to open again
+    counts with its impulse since LOAD.
+    """
+    work = 0.0
+    for k in range(count):
+        row, fact = rows.row[k], rows.fact[k]
+        if rows.idle[k] > number or row[STIFFNESS] > 0.0:
+            continue
+        a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
+        opening = along_six(row[NORMAL : NORMAL + 6], a, b, first)
+        slip = along_six(row[SHEAR : SHEAR + 6], a, b, first)
+        opening += along_six(row[NORMAL : NORMAL + 6], a, b, NOW)
+        slip += along_six(row[SHEAR : SHEAR + 6], a, b, NOW)
+        spin = row[ROLL] * (a[first + 2] + a[NOW + 2])
+        spin += row[ROLL + 1] * (b[first + 2] + b[NOW + 2])
+        normal, shear, rolled = row[IMPULSE], row[IMPULSE + 1], row[ROLLED]
+        if fact[BOUNCE] > 0.0:
+            normal, shear = normal - fact[LOAD], shear - fact[LOAD + 1]
+            rolled -= fact[LOAD + 2]
+        work += 0.5 * (normal * opening + shear * slip + rolled * spin)
+    return work
+
+
+@kernel
+def aim_rebound(rows: Rows, n: int, count: int, number: int, share: float) -> None:
+    """Prepare an island for the rebound at the end of a substep with a fraction of restitution.
+
+    Contacts with an impact keep their impulses, so that friction is limited by the total impulse of
+    the impact.
+    """
+    for s in range(n):
+        for q in range(3):
+            rows.slot[s, NOW + q] = rows.slot[s, BEFORE + q]
+    for k in range(count):
+        row, fact = rows.row[k], rows.fact[k]
+        if rows.idle[k] > number or row[STIFFNESS] > 0.0:
+            continue
+        row[ROLL_LIMIT] = row[ROLLING] * max(fact[LOAD], 0.0)
+        if fact[BOUNCE] > 0.0:
+            row[IMPULSE], row[IMPULSE + 1] = fact[LOAD], fact[LOAD + 1]
+            row[ROLLED] = fact[LOAD + 2]
+            row[ROLL_LIMIT] *= 1.0 + share * fact[REBOUND]
+            row[AIM], row[TENSION] = share * fact[BOUNCE], -fact[LOAD]  # in sum no tension
+        else:
+            row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = 0.0
+
+
+@kernel
+def rebound(
+    rows: Rows, n: int, count: int, number: int, h: float, reach: float, tolerance: float,
+    touch: float,
+) -> int:  # fmt: skip
+    """Open all contacts with an impact at the end of the substep; return the number of sweeps.
+
+    `h` is the least length of the next substep [s], within which open contacts may close.
+
+    Restitution with friction can increase the kinetic energy in an eccentric impact. A plastic
+    impact, which did the work `lost` < 0 [J], cannot. Energy is quadratic in the velocities, so the
+    gain is a convex function of the fraction of restitution. At the fraction where the chord from
+    plastic to full restitution is zero, the gain is therefore not positive.
+    """
+    lost = work_from(rows, count, number, FREE)
+    for s in range(n):
+        for q in range(3):
+            rows.slot[s, BEFORE + q] = rows.slot[s, NOW + q]
+    for k in range(count):
+        if rows.idle[k] <= number:
+            i, j = rows.row_i[k], rows.row_j[k]
+            row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
+            place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
+            aim_row(row, fact, a, b, h, h, touch)
+            fact[LOAD], fact[LOAD + 1] = row[IMPULSE], row[IMPULSE + 1]
+            fact[LOAD + 2] = row[ROLLED]
+            if row[STIFFNESS] > 0.0:  # a spring keeps its impulse during the rebound
+                row[KEEP] = row[KEEP_SHEAR] = 1.0
+                row[GAIN] = row[GAIN_SHEAR] = 0.0
+    sweeps, share = 0, 1.0
+    for attempt in range(3):
+        aim_rebound(rows, n, count, number, share)
+        sweeps += settle(rows, n, count, number, reach, tolerance)
+        work = work_from(rows, count, number, BEFORE)
+        if lost + work <= -ROUNDING * lost:
+            break
+        share = min(max(-lost / work, 0.0), 1.0) if attempt == 0 else 0.0
+        if attempt == 2:  # the sweeps do not converge: no rebound
+            take_back(rows, n, count, number)
+    for k in range(count):
+        row, fact = rows.row[k], rows.fact[k]
+        if rows.idle[k] > number or row[STIFFNESS] > 0.0:
+            continue
+        a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
+        if fact[BOUNCE] > 0.0:
+            normal, shear = row[IMPULSE] - fact[LOAD], row[IMPULSE + 1] - fact[LOAD + 1]
+            count_row(row, fact, a, b, normal, shear, row[ROLLED] - fact[LOAD + 2])
+            fact[BOUNCE] = row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = 0.0
+        else:
+            count_row(row, fact, a, b, row[IMPULSE], row[IMPULSE + 1], row[ROLLED])
+            row[IMPULSE], row[IMPULSE + 1] = fact[LOAD], fact[LOAD + 1]
+            row[ROLLED] = fact[LOAD + 2]
+    return sweeps
+
+
+@kernel
+def take_back(rows: Rows, n: int, count: int, number: int) -> None:
+    """Take back the rebound of an island."""
+    for s in range(n):
+        for q in range(3):
+            rows.slot[s, NOW + q] = rows.slot[s, BEFORE + q]
+    for k in range(count):
+        row, fact = rows.row[k], rows.fact[k]
+        if rows.idle[k] <= number and row[STIFFNESS] == 0.0:
+            kept = 1.0 if fact[BOUNCE] > 0.0 else 0.0
+            row[IMPULSE], row[IMPULSE + 1] = kept * fact[LOAD], kept * fact[LOAD + 1]
+            row[ROLLED] = kept * fact[LOAD + 2]

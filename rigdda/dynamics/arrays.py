@@ -115,6 +115,7 @@ class Rows(NamedTuple):
     row_i: Ints  # (C,) slots of bodies a and b
     row_j: Ints
     idle: Ints  # (C,) substep before which a contact cannot close
+    active: Ints  # (C,) rows of the contacts that may close in this substep
     visit: Ints  # (C,) contacts visited by a sweep
     place: Ints  # (C,) row of each contact
     face: Ints  # (C,) 2 if a row is solved together with the next one, 0 for the latter, else 1

@@ -137,6 +137,7 @@ def empty_work(bodies: int, blocks: int, room: int) -> Work:
             row_i=whole(room),
             row_j=whole(room),
             idle=whole(room),
+            active=whole(room),
             visit=whole(room),
             place=whole(room),
             face=whole(room),

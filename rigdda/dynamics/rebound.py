@@ -1,4 +1,10 @@
-"""Rebound: contacts with an impact open at the end of a substep by restitution."""
+"""Rebound: contacts with an impact open at the end of a substep by restitution.
+
+A rebound takes no time. It changes the velocities of the bodies that were struck, and of the bodies
+that they touch; only contacts of bodies that were struck take part. Contacts that are still open
+cannot close in it. They close in the next substep, where they may have an impact of their own, as
+do the contacts of the bodies that a struck body pushes.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +16,11 @@ from rigdda.dynamics.rows import (
     AIM,
     BEFORE,
     BOUNCE,
+    BOUNCES,
     FREE,
     GAIN,
     GAIN_SHEAR,
+    GAP,
     IMPULSE,
     KEEP,
     KEEP_SHEAR,
@@ -26,6 +34,7 @@ from rigdda.dynamics.rows import (
     ROLLING,
     SHEAR,
     STIFFNESS,
+    STRENGTH,
     TENSION,
     along_six,
     place_row,
@@ -36,16 +45,54 @@ from rigdda.kernel import kernel
 
 
 @kernel
-def work_from(rows: Rows, count: int, number: int, first: int) -> float:
+def list_struck(rows: Rows, active: int) -> int:
+    """Keep only the active contacts of bodies that were struck; return their number."""
+    kept = 0
+    for q in range(active):
+        k = rows.active[q]
+        if rows.slot[rows.row_i[k], BOUNCES] + rows.slot[rows.row_j[k], BOUNCES] > 0.0:
+            rows.active[kept] = k
+            kept += 1
+    return kept
+
+
+@kernel
+def start_rebound(rows: Rows, active: int, h: float, touch: float) -> int:
+    """Set up the contacts of a rebound, and leave out the open ones; return the number of others.
+
+    Their geometry is that at the end of the substep of length `h` [s].
+    """
+    kept = 0
+    for q in range(active):
+        k = rows.active[q]
+        i, j = rows.row_i[k], rows.row_j[k]
+        row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
+        place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
+        rigid = row[STIFFNESS] == 0.0 and fact[STRENGTH] == 0.0 and fact[STRENGTH + 1] == 0.0
+        if rigid and row[GAP] > touch and fact[BOUNCE] == 0.0:
+            continue
+        aim_row(row, fact, a, b, h, h, touch)
+        fact[LOAD], fact[LOAD + 1], fact[LOAD + 2] = row[IMPULSE], row[IMPULSE + 1], row[ROLLED]
+        if row[STIFFNESS] > 0.0:  # a spring keeps its impulse during the rebound
+            row[KEEP] = row[KEEP_SHEAR] = 1.0
+            row[GAIN] = row[GAIN_SHEAR] = 0.0
+        rows.active[kept] = k
+        kept += 1
+    return kept
+
+
+@kernel
+def work_from(rows: Rows, active: int, first: int) -> float:
     """Return the work of contacts other than springs on instantaneous velocity changes [J].
 
     `first` is the column of the slots with the velocities before. A contact that has to open again
     counts with its impulse since LOAD.
     """
     work = 0.0
-    for k in range(count):
+    for place in range(active):
+        k = rows.active[place]
         row, fact = rows.row[k], rows.fact[k]
-        if rows.idle[k] > number or row[STIFFNESS] > 0.0:
+        if row[STIFFNESS] > 0.0:
             continue
         a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
         opening = along_six(row[NORMAL : NORMAL + 6], a, b, first)
@@ -63,8 +110,8 @@ def work_from(rows: Rows, count: int, number: int, first: int) -> float:
 
 
 @kernel
-def aim_rebound(rows: Rows, n: int, count: int, number: int, share: float) -> None:
-    """Prepare an island for the rebound at the end of a substep with a fraction of restitution.
+def aim_rebound(rows: Rows, n: int, active: int, share: float) -> None:
+    """Prepare the contacts of a rebound with a fraction of restitution.
 
     Contacts with an impact keep their impulses, so that friction is limited by the total impulse of
     the impact.
@@ -72,9 +119,10 @@ def aim_rebound(rows: Rows, n: int, count: int, number: int, share: float) -> No
     for s in range(n):
         for q in range(3):
             rows.slot[s, NOW + q] = rows.slot[s, BEFORE + q]
-    for k in range(count):
+    for q in range(active):
+        k = rows.active[q]
         row, fact = rows.row[k], rows.fact[k]
-        if rows.idle[k] > number or row[STIFFNESS] > 0.0:
+        if row[STIFFNESS] > 0.0:
             continue
         row[ROLL_LIMIT] = row[ROLLING] * max(fact[LOAD], 0.0)
         if fact[BOUNCE] > 0.0:
@@ -88,46 +136,46 @@ def aim_rebound(rows: Rows, n: int, count: int, number: int, share: float) -> No
 
 @kernel
 def rebound(
-    rows: Rows, n: int, count: int, number: int, h: float, reach: float, tolerance: float,
+    rows: Rows, n: int, active: int, number: int, h: float, reach: float, tolerance: float,
     touch: float,
 ) -> int:  # fmt: skip
-    """Open all contacts with an impact at the end of the substep; return the number of sweeps.
+    """Open all contacts with an impact at the end of a substep; return the number of sweeps.
 
-    `h` is the least length of the next substep [s], within which open contacts may close.
+    `h` is the length of the substep [s].
 
     Restitution with friction can increase the kinetic energy in an eccentric impact. A plastic
     impact, which did the work `lost` < 0 [J], cannot. Energy is quadratic in the velocities, so the
     gain is a convex function of the fraction of restitution. At the fraction where the chord from
     plastic to full restitution is zero, the gain is therefore not positive.
     """
-    lost = work_from(rows, count, number, FREE)
+    rows.slot[n, BOUNCES] = 0.0  # what does not move is not struck
+    struck = list_struck(rows, active)
+    lost = work_from(rows, struck, FREE)
+    struck = start_rebound(rows, struck, h, touch)
     for s in range(n):
         for q in range(3):
             rows.slot[s, BEFORE + q] = rows.slot[s, NOW + q]
-    for k in range(count):
-        if rows.idle[k] <= number:
-            i, j = rows.row_i[k], rows.row_j[k]
-            row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
-            place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
-            aim_row(row, fact, a, b, h, h, touch)
-            fact[LOAD], fact[LOAD + 1] = row[IMPULSE], row[IMPULSE + 1]
-            fact[LOAD + 2] = row[ROLLED]
-            if row[STIFFNESS] > 0.0:  # a spring keeps its impulse during the rebound
-                row[KEEP] = row[KEEP_SHEAR] = 1.0
-                row[GAIN] = row[GAIN_SHEAR] = 0.0
     sweeps, share = 0, 1.0
     for attempt in range(3):
-        aim_rebound(rows, n, count, number, share)
-        sweeps += settle(rows, n, count, number, reach, tolerance)
-        work = work_from(rows, count, number, BEFORE)
+        aim_rebound(rows, n, struck, share)
+        sweeps += settle(rows, n, struck, number, reach, tolerance)
+        work = work_from(rows, struck, BEFORE)
         if lost + work <= -ROUNDING * lost:
             break
         share = min(max(-lost / work, 0.0), 1.0) if attempt == 0 else 0.0
         if attempt == 2:  # the sweeps do not converge: no rebound
-            take_back(rows, n, count, number)
-    for k in range(count):
+            take_back(rows, n, struck)
+    end_rebound(rows, struck)
+    return sweeps
+
+
+@kernel
+def end_rebound(rows: Rows, active: int) -> None:
+    """Sum up the impulses of a rebound, and resume those before it where there was no impact."""
+    for q in range(active):
+        k = rows.active[q]
         row, fact = rows.row[k], rows.fact[k]
-        if rows.idle[k] > number or row[STIFFNESS] > 0.0:
+        if row[STIFFNESS] > 0.0:
             continue
         a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
         if fact[BOUNCE] > 0.0:
@@ -138,18 +186,18 @@ def rebound(
             count_row(row, fact, a, b, row[IMPULSE], row[IMPULSE + 1], row[ROLLED])
             row[IMPULSE], row[IMPULSE + 1] = fact[LOAD], fact[LOAD + 1]
             row[ROLLED] = fact[LOAD + 2]
-    return sweeps
 
 
 @kernel
-def take_back(rows: Rows, n: int, count: int, number: int) -> None:
-    """Take back the rebound of an island."""
+def take_back(rows: Rows, n: int, active: int) -> None:
+    """Take back a rebound."""
     for s in range(n):
         for q in range(3):
             rows.slot[s, NOW + q] = rows.slot[s, BEFORE + q]
-    for k in range(count):
+    for q in range(active):
+        k = rows.active[q]
         row, fact = rows.row[k], rows.fact[k]
-        if rows.idle[k] <= number and row[STIFFNESS] == 0.0:
+        if row[STIFFNESS] == 0.0:
             kept = 1.0 if fact[BOUNCE] > 0.0 else 0.0
             row[IMPULSE], row[IMPULSE + 1] = kept * fact[LOAD], kept * fact[LOAD + 1]
             row[ROLLED] = kept * fact[LOAD + 2]

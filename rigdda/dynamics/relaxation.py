@@ -158,19 +158,18 @@ def relax(
         pull(rows.slot, n, h)
         if fenced:
             ledger[1] -= hold_fences(rows.slot, rows.scale, n)
-        start_rows(rows, count, number, h, h - gone * h, h / last, touch)
-        swept = settle_safely(rows, n, count, number, reach, tolerance)
+        active = start_rows(rows, count, number, h, h - gone * h, h / last, touch)
+        swept = settle_safely(rows, n, active, number, reach, tolerance)
         sweeps += swept
-        while fenced and release_fences(rows, n, count, number, h, touch, ledger):
-            sweeps += settle(rows, n, count, number, reach, tolerance)
+        while fenced and release_fences(rows, n, active, h, touch, ledger):
+            sweeps += settle(rows, n, active, number, reach, tolerance)
         if fenced:
             end_fences(rows.slot, rows.scale, n, ledger)
-        hit, bouncing = end_rows(rows, n, count, number, least)
+        hit, bouncing = end_rows(rows, n, active, least)
         drift(rows.slot, rows.scale, n, h, gone)
         ledger[2] += fade(rows.slot, n, 0.5 * h)
         if bouncing:
-            following = shortest if alone else h
-            sweeps += rebound(rows, n, count, number, following, reach, tolerance, touch)
+            sweeps += rebound(rows, n, active, number, h, reach, tolerance, touch)
             ledger[1] -= stop_uphill(rows.slot, n)
         struck, last, left = struck or hit, h, left - h if h < left else 0.0
         number += 0 if alone else 1

@@ -72,7 +72,10 @@ PULL, DAMPING, FIELD, HELD = 14, 17, 18, 19
 # x, used while it yields. LEFT, START: remaining elongation and x at the start of the step [m].
 BRAKE, MOVES, LEFT, START = 20, 21, 22, 23
 
-SLOT_COLUMNS = 24
+# BOUNCES: 1 if one of its contacts has to open again at the end of this substep, else 0.
+BOUNCES = 24
+
+SLOT_COLUMNS = 25
 
 # rows.form: the vertex belongs to a, to b, or the contact is a bolt between two points
 OF_A, OF_B, BETWEEN = 0, 1, 2

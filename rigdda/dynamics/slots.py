@@ -8,6 +8,7 @@ from rigdda.dynamics.arrays import Islands, Rows
 from rigdda.dynamics.equations import load_moment
 from rigdda.dynamics.records import Bodies, Body, Floats, Parameters
 from rigdda.dynamics.rows import (
+    BOUNCES,
     BEFORE,
     BRAKE,
     COS,
@@ -86,7 +87,7 @@ def pull(slots: Floats, n: int, h: float) -> None:
             slot[BEFORE + q] = slot[NOW + q]
             slot[NOW + q] += h * slot[PULL + q]
             slot[FREE + q] = slot[NOW + q]
-        slot[HELD] = 0.0
+        slot[HELD] = slot[BOUNCES] = 0.0
 
 
 @kernel

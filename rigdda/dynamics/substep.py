@@ -14,6 +14,7 @@ from rigdda.dynamics.rows import (
     BEFORE,
     BEND,
     BOUNCE,
+    BOUNCES,
     COHESION,
     FLEXIBLE,
     FREE,
@@ -101,16 +102,21 @@ def aim_row(
 @kernel
 def start_rows(
     rows: Rows, count: int, number: int, h: float, left: float, ratio: float, touch: float
-) -> None:
+) -> int:
     """Start a substep for all contacts that may close in it, with the impulses of the last one.
+
+    They are listed in rows.active, in their order; returns their number.
 
     `left` is the time for which the bodies still have to move in the substep [s], and `ratio` its
     length over that of the last one, which scales the warm start.
     """
+    active = 0
     for place in range(count):
         k = np.uintp(place)
         if rows.idle[k] > number:
             continue
+        rows.active[np.uintp(active)] = place
+        active += 1
         i, j = np.uintp(rows.row_i[k]), np.uintp(rows.row_j[k])
         row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
         place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
@@ -125,6 +131,7 @@ def start_rows(
             limit = row[ROLL_LIMIT] = row[ROLLING] * max(row[IMPULSE], 0.0)
             row[ROLLED] = min(max(ratio * row[ROLLED], -limit), limit)
             turn(row, a, b, row[ROLLED])
+    return active
 
 
 @arithmetic_kernel
@@ -160,7 +167,7 @@ def restitution(fact: Floats, speed: float) -> float:
 
 
 @kernel
-def end_rows(rows: Rows, n: int, count: int, number: int, least: float) -> tuple[bool, bool]:
+def end_rows(rows: Rows, n: int, active: int, least: float) -> tuple[bool, bool]:
     """End a substep for its contacts: sum up their impulses and detect impacts.
 
     An impact is a contact that closed faster than `least` [m/s] at the start of the substep.
@@ -171,11 +178,11 @@ def end_rows(rows: Rows, n: int, count: int, number: int, least: float) -> tuple
         Whether there was an impact, and whether any contact has to open again.
     """
     struck, bouncing = False, False
-    for place in range(count):
-        k = np.uintp(place)
+    for q in range(active):
+        k = np.uintp(rows.active[np.uintp(q)])
         row, fact = rows.row[k], rows.fact[k]
         normal, shear = row[IMPULSE], row[IMPULSE + 1]
-        if rows.idle[k] > number or (normal == 0.0 and shear == 0.0):
+        if normal == 0.0 and shear == 0.0:
             continue
         a, b = rows.slot[np.uintp(rows.row_i[k])], rows.slot[np.uintp(rows.row_j[k])]
         count_row(row, fact, a, b, normal, shear, row[ROLLED])
@@ -190,5 +197,6 @@ def end_rows(rows: Rows, n: int, count: int, number: int, least: float) -> tuple
             fact[REBOUND] = restitution(fact, -opening)
             struck, fact[STRUCK], fact[BOUNCE] = True, 1.0, -fact[REBOUND] * opening
             fact[LOAD] = fact[LOAD + 1] = fact[LOAD + 2] = 0.0
-            bouncing = bouncing or fact[BOUNCE] > 0.0
+            if fact[BOUNCE] > 0.0:
+                bouncing, a[BOUNCES], b[BOUNCES] = True, 1.0, 1.0
     return struck, bouncing

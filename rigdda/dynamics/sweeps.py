@@ -52,12 +52,12 @@ def turn(row: Floats, a: Floats, b: Floats, impulse: float) -> None:
 
 
 @kernel
-def limit_rolling(rows: Rows, count: int, number: int) -> bool:
+def limit_rolling(rows: Rows, active: int) -> bool:
     """Limit rolling impulses by the present normal impulses; return whether any limit grew."""
     grew = False
-    for k in range(count):
-        row = rows.row[k]
-        if row[ROLLING] > 0.0 and rows.idle[k] <= number:
+    for q in range(active):
+        row = rows.row[rows.active[q]]
+        if row[ROLLING] > 0.0:
             limit = row[ROLLING] * max(row[IMPULSE], 0.0)
             grew = grew or limit > row[ROLL_LIMIT]
             row[ROLL_LIMIT] = limit
@@ -65,7 +65,7 @@ def limit_rolling(rows: Rows, count: int, number: int) -> bool:
 
 
 @kernel
-def list_visits(rows: Rows, count: int, tries: int, number: int) -> int:
+def list_visits(rows: Rows, active: int, tries: int, number: int) -> int:
     """Write the contacts that the next sweep visits into rows.visit; return their number.
 
     Contacts that cannot close before substep idle[k] are skipped. After the first sweep of a
@@ -74,7 +74,8 @@ def list_visits(rows: Rows, count: int, tries: int, number: int) -> int:
     next one overwrites it. This avoids a branch that the processor cannot predict.
     """
     visits = 0
-    for place in range(count):
+    for q in range(active):
+        place = rows.active[np.uintp(q)]
         k = np.uintp(place)
         i, j = np.uintp(rows.row_i[k]), np.uintp(rows.row_j[k])
         moved = (rows.moved_in[i] >= tries - 1) | (rows.moved_in[j] >= tries - 1)
@@ -240,22 +241,22 @@ def is_open(row: Floats) -> bool:
 
 
 @kernel
-def settle(rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float) -> int:
+def settle(rows: Rows, n: int, active: int, number: int, reach: float, tolerance: float) -> int:
     """Sweep until no velocity changes by more than a tolerance; return the sweeps.
 
     Normal velocities count, and R times rates of rotation where rolling is resisted. See the module
     docstring on the second set of sweeps.
     """
-    sweeps = sweep_until(rows, n, count, number, reach, tolerance, math.inf)
-    if limit_rolling(rows, count, number):
-        again = sweep_until(rows, n, count, number, reach, tolerance, math.inf)
+    sweeps = sweep_until(rows, n, active, number, reach, tolerance, math.inf)
+    if limit_rolling(rows, active):
+        again = sweep_until(rows, n, active, number, reach, tolerance, math.inf)
         sweeps = max(sweeps, again)
     return sweeps
 
 
 @kernel
 def settle_safely(
-    rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float
+    rows: Rows, n: int, active: int, number: int, reach: float, tolerance: float
 ) -> int:
     """Settle a substep without increasing the energy; return the sweeps.
 
@@ -263,21 +264,20 @@ def settle_safely(
     aside, they are repeated from contacts without impulses and without extrapolation, which never
     increases the energy.
     """
-    sweeps = settle(rows, n, count, number, reach, tolerance)
+    sweeps = settle(rows, n, active, number, reach, tolerance)
     if sweeps < MOST_SWEEPS or kinetic(rows.slot, n, NOW) <= kinetic(rows.slot, n, FREE):
         return sweeps
     for s in range(n):
         for q in range(3):
             rows.slot[s, NOW + q] = rows.slot[s, FREE + q]
-    for k in range(count):
-        row = rows.row[k]
-        if rows.idle[k] <= number:
-            row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = row[ROLL_LIMIT] = 0.0
-    return sweep_until(rows, n, count, number, reach, tolerance, -1.0)
+    for q in range(active):
+        row = rows.row[rows.active[q]]
+        row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = row[ROLL_LIMIT] = 0.0
+    return sweep_until(rows, n, active, number, reach, tolerance, -1.0)
 
 
 @kernel
-def extrapolate(rows: Rows, count: int, number: int, before: float) -> float:
+def extrapolate(rows: Rows, active: int, before: float) -> float:
     """Extrapolate the impulses from their changes by the last sweeps and by those before.
 
     A set of sweeps is a step of a fixed-point iteration x -> G(x) with the residual r = G(x) - x.
@@ -297,10 +297,9 @@ def extrapolate(rows: Rows, count: int, number: int, before: float) -> float:
         Square of the residual [J], or -1 if it has grown.
     """
     square = slope = curvature = 0.0
-    for k in range(count):
+    for place in range(active):
+        k = rows.active[place]
         row, fact = rows.row[k], rows.fact[k]
-        if rows.idle[k] > number:
-            continue
         for q in range(2):
             residue = row[IMPULSE + q] - fact[REACHED + q]
             change = residue - fact[RESIDUE + q]
@@ -309,10 +308,9 @@ def extrapolate(rows: Rows, count: int, number: int, before: float) -> float:
             curvature += row[FLEXIBLE] * change * change
     grew = square > before
     share = max(-slope / curvature, 0.0) if curvature > 0.0 and not grew else 0.0
-    for k in range(count):
+    for place in range(active):
+        k = rows.active[place]
         row, fact = rows.row[k], rows.fact[k]
-        if rows.idle[k] > number:
-            continue
         a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
         for q in range(2):
             goal = row[IMPULSE + q]
@@ -326,31 +324,32 @@ def extrapolate(rows: Rows, count: int, number: int, before: float) -> float:
 
 @kernel
 def sweep_until(
-    rows: Rows, n: int, count: int, number: int, reach: float, tolerance: float, square: float
+    rows: Rows, n: int, active: int, number: int, reach: float, tolerance: float, square: float
 ) -> int:
     """Sweep until no velocity changes by more than a tolerance, or `MOST_SWEEPS` times.
 
     `square` is inf, or -1 to sweep without extrapolation, see `extrapolate`.
     """
-    start_extrapolation(rows, count)
+    start_extrapolation(rows, active)
     for s in range(n + 1):
         rows.moved_in[s] = -1
     for tries in range(MOST_SWEEPS):
-        visits = list_visits(rows, count, tries, number)
+        visits = list_visits(rows, active, tries, number)
         worst = sweep(rows, n, visits, tries, number, reach, tolerance)
         if worst <= tolerance:
             return tries + 1
         if (tries + 1) % SET_OF_SWEEPS == 0 and square >= 0.0 and tries + 1 < MOST_SWEEPS:
-            square = extrapolate(rows, count, number, square)
+            square = extrapolate(rows, active, square)
             for s in range(n + 1):
                 rows.moved_in[s] = tries
     return MOST_SWEEPS
 
 
 @kernel
-def start_extrapolation(rows: Rows, count: int) -> None:
+def start_extrapolation(rows: Rows, active: int) -> None:
     """Begin to extrapolate the impulses from their present values."""
-    for k in range(count):
+    for place in range(active):
+        k = rows.active[place]
         row, fact = rows.row[k], rows.fact[k]
         for q in range(2):
             fact[REACHED + q], fact[RESIDUE + q], fact[GOAL + q] = row[IMPULSE + q], 0.0, 0.0

@@ -47,16 +47,17 @@ def push_downhill(rows: Rows, k: int, s: int) -> float:
 
 
 @kernel
-def rest_on(rows: Rows, count: int, number: int, s: int, share: float) -> None:
+def rest_on(rows: Rows, active: int, s: int, share: float) -> None:
     """Reduce the impulses on a held fence before it is released.
 
     Downhill normal impulses keep the fraction `share`, all others are set to zero. The impulses on
     a fence at rest are much greater than those that a light moving fence can transmit, and sweeps
     that start from them may gain energy.
     """
-    for k in range(count):
+    for q in range(active):
+        k = rows.active[q]
         i, j = rows.row_i[k], rows.row_j[k]
-        if rows.idle[k] > number or (i != s and j != s):
+        if i != s and j != s:
             continue
         row, a, b = rows.row[k], rows.slot[i], rows.slot[j]
         kept = share if push_downhill(rows, k, s) > 0.0 else 0.0
@@ -68,7 +69,7 @@ def rest_on(rows: Rows, count: int, number: int, s: int, share: float) -> None:
 
 @kernel
 def release_fences(
-    rows: Rows, n: int, count: int, number: int, h: float, touch: float, ledger: NDArray
+    rows: Rows, n: int, active: int, h: float, touch: float, ledger: NDArray
 ) -> bool:  # fmt: skip
     """Release fences that contacts push harder than their brakes; return whether any was released.
 
@@ -83,8 +84,9 @@ def release_fences(
             continue
         brake = h * slot[BRAKE] if slot[X] - slot[START] < slot[LEFT] else 0.0
         net = pushed = 0.0
-        for k in range(count):
-            if rows.idle[k] <= number and (rows.row_i[k] == s or rows.row_j[k] == s):
+        for q in range(active):
+            k = rows.active[q]
+            if rows.row_i[k] == s or rows.row_j[k] == s:
                 net += push_downhill(rows, k, s)
                 pushed += max(push_downhill(rows, k, s), 0.0)
         if net + slot[BEFORE] / slot[MOVES] <= brake:
@@ -93,11 +95,12 @@ def release_fences(
         ledger[1] += 0.5 * slot[BEFORE] * slot[BEFORE]
         slot[NOW] = slot[FREE] = slot[BEFORE] - brake * slot[MOVES]
         share = min(brake / pushed, 1.0) if pushed > 0.0 else 0.0
-        rest_on(rows, count, number, s, share)
+        rest_on(rows, active, s, share)
         rows.scale[s, 0] = slot[MOVES]
-        for k in range(count):
+        for q in range(active):
+            k = rows.active[q]
             i, j = rows.row_i[k], rows.row_j[k]
-            if rows.idle[k] > number or (i != s and j != s):
+            if i != s and j != s:
                 continue
             row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
             place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])

@@ -9,9 +9,7 @@ do the contacts of the bodies that a struck body pushes.
 from __future__ import annotations
 
 from rigdda.dynamics.arrays import Rows
-from rigdda.dynamics.constants import (
-    ROUNDING,
-)
+from rigdda.dynamics.constants import ROUNDING, SPEED_LIMIT
 from rigdda.dynamics.rows import (
     AIM,
     BEFORE,
@@ -39,7 +37,7 @@ from rigdda.dynamics.rows import (
     along_six,
     place_row,
 )
-from rigdda.dynamics.substep import aim_row, count_row
+from rigdda.dynamics.substep import aim_row, count_row, couple_face
 from rigdda.dynamics.sweeps import settle
 from rigdda.kernel import kernel
 
@@ -57,28 +55,25 @@ def list_struck(rows: Rows, active: int) -> int:
 
 
 @kernel
-def start_rebound(rows: Rows, active: int, h: float, touch: float) -> int:
-    """Set up the contacts of a rebound, and leave out the open ones; return the number of others.
+def start_rebound(rows: Rows, active: int, h: float, reach: float, touch: float) -> None:
+    """Set up the contacts of a rebound at the end of a substep of length `h` [s].
 
-    Their geometry is that at the end of the substep of length `h` [s].
+    Open contacts do not limit the velocity with which they close.
     """
-    kept = 0
     for q in range(active):
         k = rows.active[q]
         i, j = rows.row_i[k], rows.row_j[k]
         row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
         place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
-        rigid = row[STIFFNESS] == 0.0 and fact[STRENGTH] == 0.0 and fact[STRENGTH + 1] == 0.0
-        if rigid and row[GAP] > touch and fact[BOUNCE] == 0.0:
-            continue
         aim_row(row, fact, a, b, h, h, touch)
-        fact[LOAD], fact[LOAD + 1], fact[LOAD + 2] = row[IMPULSE], row[IMPULSE + 1], row[ROLLED]
         if row[STIFFNESS] > 0.0:  # a spring keeps its impulse during the rebound
             row[KEEP] = row[KEEP_SHEAR] = 1.0
             row[GAIN] = row[GAIN_SHEAR] = 0.0
-        rows.active[kept] = k
-        kept += 1
-    return kept
+        elif row[GAP] > touch and fact[STRENGTH + 1] == 0.0:
+            row[AIM] = -min(reach, SPEED_LIMIT)
+        if rows.face[k] == 0:
+            couple_face(rows.row[k - 1], row)
+        fact[LOAD], fact[LOAD + 1], fact[LOAD + 2] = row[IMPULSE], row[IMPULSE + 1], row[ROLLED]
 
 
 @kernel
@@ -151,7 +146,7 @@ def rebound(
     rows.slot[n, BOUNCES] = 0.0  # what does not move is not struck
     struck = list_struck(rows, active)
     lost = work_from(rows, struck, FREE)
-    struck = start_rebound(rows, struck, h, touch)
+    start_rebound(rows, struck, h, reach, touch)
     for s in range(n):
         for q in range(3):
             rows.slot[s, BEFORE + q] = rows.slot[s, NOW + q]

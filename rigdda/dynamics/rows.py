@@ -37,7 +37,11 @@ GAP, BEND = 27, 28
 # impulse over R [N s], at most ROLL_LIMIT and at most ROLLING [-] times the normal impulse.
 ROLL, ROLLED, ROLL_LIMIT, ROLLING = 30, 32, 33, 34
 
-COLUMNS = 35
+# BOTH, of the first of the two contacts of a face: normal velocity of each per impulse of the other
+# [1/kg]. INVERSE: inverse determinant of the 2 x 2 matrix of both, 0 if it is singular [kg2].
+BOTH, INVERSE = 35, 36
+
+COLUMNS = 37
 
 # Columns of rows.fact. VERTEX, FACE, DIRECTION, each with + 1: position of the vertex and of the
 # point of the face, and the normal, in body coordinates [m]. FREE_GAP, FREE_SHEAR: displacements at

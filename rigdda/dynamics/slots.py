@@ -8,8 +8,8 @@ from rigdda.dynamics.arrays import Islands, Rows
 from rigdda.dynamics.equations import load_moment
 from rigdda.dynamics.records import Bodies, Body, Floats, Parameters
 from rigdda.dynamics.rows import (
-    BOUNCES,
     BEFORE,
+    BOUNCES,
     BRAKE,
     COS,
     DAMPING,

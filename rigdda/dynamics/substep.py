@@ -13,6 +13,7 @@ from rigdda.dynamics.rows import (
     AIM_SHEAR,
     BEFORE,
     BEND,
+    BOTH,
     BOUNCE,
     BOUNCES,
     COHESION,
@@ -26,6 +27,7 @@ from rigdda.dynamics.rows import (
     GAP,
     HELD,
     IMPULSE,
+    INVERSE,
     KEEP,
     KEEP_SHEAR,
     LOAD,
@@ -99,6 +101,17 @@ def aim_row(
         row[AIM_SHEAR] = -4.0 * slip / h - along_six(row[SHEAR : SHEAR + 6], a, b, BEFORE)
 
 
+@arithmetic_kernel
+def couple_face(row: Floats, other: Floats) -> None:
+    """Set the coupling of the two contacts of a face, after `aim_row` of both."""
+    both = 0.0
+    for q in range(6):
+        both += row[NORMAL + q] * other[NORMAL + q]
+    product = row[FLEXIBLE] * other[FLEXIBLE]
+    determinant = product - both * both
+    row[BOTH], row[INVERSE] = both, 1.0 / determinant if determinant > 1e-9 * product else 0.0
+
+
 @kernel
 def start_rows(
     rows: Rows, count: int, number: int, h: float, left: float, ratio: float, touch: float
@@ -121,6 +134,8 @@ def start_rows(
         row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
         place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
         aim_row(row, fact, a, b, h, left, touch)
+        if rows.face[k] == 0:
+            couple_face(rows.row[k - np.uintp(1)], row)
         row[ROLL_LIMIT] = 0.0
         if row[IMPULSE] != 0.0 or row[IMPULSE + 1] != 0.0:
             row[IMPULSE] *= ratio

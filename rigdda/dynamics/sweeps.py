@@ -16,6 +16,7 @@ from rigdda.dynamics.records import Floats
 from rigdda.dynamics.rows import (
     AIM,
     AIM_SHEAR,
+    BOTH,
     COHESION,
     FLEXIBLE,
     FREE,
@@ -24,6 +25,7 @@ from rigdda.dynamics.rows import (
     GAIN_SHEAR,
     GOAL,
     IMPULSE,
+    INVERSE,
     KEEP,
     KEEP_SHEAR,
     NORMAL,
@@ -98,8 +100,9 @@ def press_row(row: Floats, a: Floats, b: Floats) -> float:
 
 @arithmetic_kernel
 def solve_face(
-    own: float, other: float, both: float, speed: float, speed_2: float, low: float, low_2: float
-) -> tuple[float, float]:
+    own: float, other: float, both: float, inverse: float, speed: float, speed_2: float, low: float,
+    low_2: float,
+) -> tuple[float, float]:  # fmt: skip
     """Return the normal impulses of the two contacts of a face [N s].
 
     Of the four cases in which each contact either reaches its aim or is open, that one holds in
@@ -107,16 +110,16 @@ def solve_face(
 
     Parameters
     ----------
-    own, other, both : float
-        Change of each normal velocity by its own impulse, and of each by the other's [1/kg].
+    own, other, both, inverse : float
+        Change of each normal velocity by its own impulse, and of each by the other's [1/kg], and
+        the inverse determinant of the matrix of these [kg2].
     speed, speed_2 : float
         Normal velocities without the impulses, less their aims [m/s].
     low, low_2 : float
         Least impulses [N s].
     """
-    determinant = own * other - both * both
-    one = (both * speed_2 - other * speed) / determinant
-    two = (both * speed - own * speed_2) / determinant
+    one = (both * speed_2 - other * speed) * inverse
+    two = (both * speed - own * speed_2) * inverse
     if one >= low and two >= low_2:
         return one, two
     one = max(-(speed + both * low_2) / own, low)
@@ -135,27 +138,28 @@ def press_face(row: Floats, other: Floats, a: Floats, b: Floats) -> float:
     One after the other, they converge slowly if the face is narrow: a column of 0.2 x 4 m that
     lands flat would turn and fall. Returns the greatest change of a normal velocity [m/s].
     """
-    both = 0.0
-    for q in range(6):
-        both += row[NORMAL + q] * other[NORMAL + q]
-    own, its = row[FLEXIBLE], other[FLEXIBLE]
-    if own * its - both * both <= 1e-9 * own * its:
+    if row[INVERSE] == 0.0:
         change = press_row(row, a, b)
         return max(change, press_row(other, a, b))
-    one, two = row[IMPULSE], other[IMPULSE]
-    speed = along_six(row[NORMAL : NORMAL + 6], a, b, NOW) - row[AIM] - own * one - both * two
+    own, its, both, one, two = (
+        row[FLEXIBLE], other[FLEXIBLE], row[BOTH], row[IMPULSE], other[IMPULSE],
+    )  # fmt: skip
+    speed = along_six(row[NORMAL : NORMAL + 6], a, b, NOW) - row[AIM]
     speed_2 = along_six(other[NORMAL : NORMAL + 6], a, b, NOW) - other[AIM]
-    speed_2 -= both * one + its * two
     low, low_2 = -row[TENSION], -other[TENSION]
-    new, new_2 = solve_face(own, its, both, speed, speed_2, low, low_2)
+    if one == low and two == low_2 and speed >= 0.0 and speed_2 >= 0.0:
+        return 0.0  # both stay open
+    speed -= own * one + both * two
+    speed_2 -= both * one + its * two
+    new, new_2 = solve_face(own, its, both, row[INVERSE], speed, speed_2, low, low_2)
     part = min(row[GAIN] * own, other[GAIN] * its)  # see aim_row
     more = max(part * (new - one), low - one)
     more_2 = max(part * (new_2 - two), low_2 - two)
-    if more != 0.0 or more_2 != 0.0:
-        push(row, NORMAL, a, b, NOW, more)
-        push(other, NORMAL, a, b, NOW, more_2)
-        row[IMPULSE] += more
-        other[IMPULSE] += more_2
+    for q in range(3):
+        a[NOW + q] += more * row[NORMAL + q] + more_2 * other[NORMAL + q]
+        b[NOW + q] += more * row[NORMAL + 3 + q] + more_2 * other[NORMAL + 3 + q]
+    row[IMPULSE] += more
+    other[IMPULSE] += more_2
     return max(abs(own * more + both * more_2), abs(both * more + its * more_2))
 
 

@@ -21,7 +21,7 @@ from rigdda.dynamics.rows import (
     place_row,
     push,
 )
-from rigdda.dynamics.substep import aim_row
+from rigdda.dynamics.substep import aim_row, couple_face
 from rigdda.kernel import kernel
 
 
@@ -105,6 +105,8 @@ def release_fences(
             row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
             place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
             aim_row(row, fact, a, b, h, h, touch)
+            if rows.face[k] == 0:
+                couple_face(rows.row[k - 1], row)
             slot[NOW] += row[IMPULSE] * row[0 if i == s else 3]
     return released
 

@@ -8,13 +8,15 @@ do the contacts of the bodies that a struck body pushes.
 
 from __future__ import annotations
 
+import math
+
 from rigdda.dynamics.arrays import Rows
 from rigdda.dynamics.constants import ROUNDING, SPEED_LIMIT
 from rigdda.dynamics.rows import (
     AIM,
     BEFORE,
     BOUNCE,
-    BOUNCES,
+    FIRST,
     FREE,
     GAIN,
     GAIN_SHEAR,
@@ -33,6 +35,7 @@ from rigdda.dynamics.rows import (
     SHEAR,
     STIFFNESS,
     STRENGTH,
+    TAKEN_BACK,
     TENSION,
     along_six,
     place_row,
@@ -48,29 +51,34 @@ def list_struck(rows: Rows, active: int) -> int:
     kept = 0
     for q in range(active):
         k = rows.active[q]
-        if rows.slot[rows.row_i[k], BOUNCES] + rows.slot[rows.row_j[k], BOUNCES] > 0.0:
+        if min(rows.slot[rows.row_i[k], FIRST], rows.slot[rows.row_j[k], FIRST]) < math.inf:
             rows.active[kept] = k
             kept += 1
     return kept
 
 
 @kernel
-def start_rebound(rows: Rows, active: int, h: float, reach: float, touch: float) -> None:
+def start_rebound(rows: Rows, active: int, h: float, touch: float) -> None:
     """Set up the contacts of a rebound at the end of a substep of length `h` [s].
 
-    Open contacts do not limit the velocity with which they close.
+    Contacts with a gap do not limit the velocity with which they close.
     """
     for q in range(active):
         k = rows.active[q]
         i, j = rows.row_i[k], rows.row_j[k]
         row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
+        free = row[STIFFNESS] == 0.0 and fact[STRENGTH + 1] == 0.0 and fact[STRENGTH] < math.inf
+        opening = along_six(row[NORMAL : NORMAL + 6], a, b, FREE)
+        late = row[GAP] + min(a[FIRST], b[FIRST]) * opening > touch
+        if free and late and row[IMPULSE] > 0.0:
+            fact[BOUNCE] = TAKEN_BACK
         place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
         aim_row(row, fact, a, b, h, h, touch)
         if row[STIFFNESS] > 0.0:  # a spring keeps its impulse during the rebound
             row[KEEP] = row[KEEP_SHEAR] = 1.0
             row[GAIN] = row[GAIN_SHEAR] = 0.0
-        elif row[GAP] > touch and fact[STRENGTH + 1] == 0.0:
-            row[AIM] = -min(reach, SPEED_LIMIT)
+        elif free and (row[GAP] > touch or fact[BOUNCE] == TAKEN_BACK):
+            row[AIM] = -SPEED_LIMIT
         if rows.face[k] == 0:
             couple_face(rows.row[k - 1], row)
         fact[LOAD], fact[LOAD + 1], fact[LOAD + 2] = row[IMPULSE], row[IMPULSE + 1], row[ROLLED]
@@ -97,7 +105,7 @@ def work_from(rows: Rows, active: int, first: int) -> float:
         spin = row[ROLL] * (a[first + 2] + a[NOW + 2])
         spin += row[ROLL + 1] * (b[first + 2] + b[NOW + 2])
         normal, shear, rolled = row[IMPULSE], row[IMPULSE + 1], row[ROLLED]
-        if fact[BOUNCE] > 0.0:
+        if fact[BOUNCE] != 0.0:
             normal, shear = normal - fact[LOAD], shear - fact[LOAD + 1]
             rolled -= fact[LOAD + 2]
         work += 0.5 * (normal * opening + shear * slip + rolled * spin)
@@ -120,20 +128,20 @@ def aim_rebound(rows: Rows, n: int, active: int, share: float) -> None:
         if row[STIFFNESS] > 0.0:
             continue
         row[ROLL_LIMIT] = row[ROLLING] * max(fact[LOAD], 0.0)
-        if fact[BOUNCE] > 0.0:
+        if fact[BOUNCE] != 0.0:
             row[IMPULSE], row[IMPULSE + 1] = fact[LOAD], fact[LOAD + 1]
             row[ROLLED] = fact[LOAD + 2]
-            row[ROLL_LIMIT] *= 1.0 + share * fact[REBOUND]
-            row[AIM], row[TENSION] = share * fact[BOUNCE], -fact[LOAD]  # in sum no tension
         else:
             row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = 0.0
+        if fact[BOUNCE] > 0.0:
+            row[ROLL_LIMIT] *= 1.0 + share * fact[REBOUND]
+            row[AIM], row[TENSION] = share * fact[BOUNCE], -fact[LOAD]  # in sum no tension
 
 
 @kernel
 def rebound(
-    rows: Rows, n: int, active: int, number: int, h: float, reach: float, tolerance: float,
-    touch: float,
-) -> int:  # fmt: skip
+    rows: Rows, n: int, active: int, number: int, h: float, tolerance: float, touch: float
+) -> int:
     """Open all contacts with an impact at the end of a substep; return the number of sweeps.
 
     `h` is the length of the substep [s].
@@ -143,17 +151,17 @@ def rebound(
     gain is a convex function of the fraction of restitution. At the fraction where the chord from
     plastic to full restitution is zero, the gain is therefore not positive.
     """
-    rows.slot[n, BOUNCES] = 0.0  # what does not move is not struck
+    rows.slot[n, FIRST] = math.inf  # what does not move is not struck
     struck = list_struck(rows, active)
     lost = work_from(rows, struck, FREE)
-    start_rebound(rows, struck, h, reach, touch)
+    start_rebound(rows, struck, h, touch)
     for s in range(n):
         for q in range(3):
             rows.slot[s, BEFORE + q] = rows.slot[s, NOW + q]
     sweeps, share = 0, 1.0
     for attempt in range(3):
         aim_rebound(rows, n, struck, share)
-        sweeps += settle(rows, n, struck, number, reach, tolerance)
+        sweeps += settle(rows, n, struck, number, math.inf, tolerance)
         work = work_from(rows, struck, BEFORE)
         if lost + work <= -ROUNDING * lost:
             break
@@ -173,7 +181,7 @@ def end_rebound(rows: Rows, active: int) -> None:
         if row[STIFFNESS] > 0.0:
             continue
         a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
-        if fact[BOUNCE] > 0.0:
+        if fact[BOUNCE] != 0.0:
             normal, shear = row[IMPULSE] - fact[LOAD], row[IMPULSE + 1] - fact[LOAD + 1]
             count_row(row, fact, a, b, normal, shear, row[ROLLED] - fact[LOAD + 2])
             fact[BOUNCE] = row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = 0.0
@@ -193,6 +201,6 @@ def take_back(rows: Rows, n: int, active: int) -> None:
         k = rows.active[q]
         row, fact = rows.row[k], rows.fact[k]
         if row[STIFFNESS] == 0.0:
-            kept = 1.0 if fact[BOUNCE] > 0.0 else 0.0
+            kept = 1.0 if fact[BOUNCE] != 0.0 else 0.0
             row[IMPULSE], row[IMPULSE + 1] = kept * fact[LOAD], kept * fact[LOAD + 1]
             row[ROLLED] = kept * fact[LOAD + 2]

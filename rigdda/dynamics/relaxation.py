@@ -169,7 +169,7 @@ def relax(
         drift(rows.slot, rows.scale, n, h, gone)
         ledger[2] += fade(rows.slot, n, 0.5 * h)
         if bouncing:
-            sweeps += rebound(rows, n, active, number, h, reach, tolerance, touch)
+            sweeps += rebound(rows, n, active, number, h, tolerance, touch)
             ledger[1] -= stop_uphill(rows.slot, n)
         struck, last, left = struck or hit, h, left - h if h < left else 0.0
         number += 0 if alone else 1

@@ -1,9 +1,9 @@
 """Rebound: contacts with an impact open at the end of a substep by restitution.
 
 A rebound takes no time. It changes the velocities of the bodies that were struck, and of the bodies
-that they touch; only contacts of bodies that were struck take part. Contacts that are still open
-cannot close in it. They close in the next substep, where they may have an impact of their own, as
-do the contacts of the bodies that a struck body pushes.
+that they touch. Only contacts of bodies that were struck take part. Those with a gap cannot close
+in it, at any velocity. They close in a later substep, where they may have an impact of their own,
+as may the contacts of the bodies that a struck body pushes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rigdda.dynamics.rows import (
     AIM,
     BEFORE,
     BOUNCE,
-    FIRST,
+    BOUNCES,
     FREE,
     GAIN,
     GAIN_SHEAR,
@@ -35,7 +35,6 @@ from rigdda.dynamics.rows import (
     SHEAR,
     STIFFNESS,
     STRENGTH,
-    TAKEN_BACK,
     TENSION,
     along_six,
     place_row,
@@ -51,7 +50,7 @@ def list_struck(rows: Rows, active: int) -> int:
     kept = 0
     for q in range(active):
         k = rows.active[q]
-        if min(rows.slot[rows.row_i[k], FIRST], rows.slot[rows.row_j[k], FIRST]) < math.inf:
+        if rows.slot[rows.row_i[k], BOUNCES] + rows.slot[rows.row_j[k], BOUNCES] > 0.0:
             rows.active[kept] = k
             kept += 1
     return kept
@@ -67,17 +66,12 @@ def start_rebound(rows: Rows, active: int, h: float, touch: float) -> None:
         k = rows.active[q]
         i, j = rows.row_i[k], rows.row_j[k]
         row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
-        free = row[STIFFNESS] == 0.0 and fact[STRENGTH + 1] == 0.0 and fact[STRENGTH] < math.inf
-        opening = along_six(row[NORMAL : NORMAL + 6], a, b, FREE)
-        late = row[GAP] + min(a[FIRST], b[FIRST]) * opening > touch
-        if free and late and row[IMPULSE] > 0.0:
-            fact[BOUNCE] = TAKEN_BACK
         place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
         aim_row(row, fact, a, b, h, h, touch)
         if row[STIFFNESS] > 0.0:  # a spring keeps its impulse during the rebound
             row[KEEP] = row[KEEP_SHEAR] = 1.0
             row[GAIN] = row[GAIN_SHEAR] = 0.0
-        elif free and (row[GAP] > touch or fact[BOUNCE] == TAKEN_BACK):
+        elif row[GAP] > touch and fact[STRENGTH + 1] == 0.0 and fact[STRENGTH] < math.inf:
             row[AIM] = -SPEED_LIMIT
         if rows.face[k] == 0:
             couple_face(rows.row[k - 1], row)
@@ -105,7 +99,7 @@ def work_from(rows: Rows, active: int, first: int) -> float:
         spin = row[ROLL] * (a[first + 2] + a[NOW + 2])
         spin += row[ROLL + 1] * (b[first + 2] + b[NOW + 2])
         normal, shear, rolled = row[IMPULSE], row[IMPULSE + 1], row[ROLLED]
-        if fact[BOUNCE] != 0.0:
+        if fact[BOUNCE] > 0.0:
             normal, shear = normal - fact[LOAD], shear - fact[LOAD + 1]
             rolled -= fact[LOAD + 2]
         work += 0.5 * (normal * opening + shear * slip + rolled * spin)
@@ -128,14 +122,13 @@ def aim_rebound(rows: Rows, n: int, active: int, share: float) -> None:
         if row[STIFFNESS] > 0.0:
             continue
         row[ROLL_LIMIT] = row[ROLLING] * max(fact[LOAD], 0.0)
-        if fact[BOUNCE] != 0.0:
+        if fact[BOUNCE] > 0.0:
             row[IMPULSE], row[IMPULSE + 1] = fact[LOAD], fact[LOAD + 1]
             row[ROLLED] = fact[LOAD + 2]
-        else:
-            row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = 0.0
-        if fact[BOUNCE] > 0.0:
             row[ROLL_LIMIT] *= 1.0 + share * fact[REBOUND]
             row[AIM], row[TENSION] = share * fact[BOUNCE], -fact[LOAD]  # in sum no tension
+        else:
+            row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = 0.0
 
 
 @kernel
@@ -151,7 +144,7 @@ def rebound(
     gain is a convex function of the fraction of restitution. At the fraction where the chord from
     plastic to full restitution is zero, the gain is therefore not positive.
     """
-    rows.slot[n, FIRST] = math.inf  # what does not move is not struck
+    rows.slot[n, BOUNCES] = 0.0  # what does not move is not struck
     struck = list_struck(rows, active)
     lost = work_from(rows, struck, FREE)
     start_rebound(rows, struck, h, touch)
@@ -181,7 +174,7 @@ def end_rebound(rows: Rows, active: int) -> None:
         if row[STIFFNESS] > 0.0:
             continue
         a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
-        if fact[BOUNCE] != 0.0:
+        if fact[BOUNCE] > 0.0:
             normal, shear = row[IMPULSE] - fact[LOAD], row[IMPULSE + 1] - fact[LOAD + 1]
             count_row(row, fact, a, b, normal, shear, row[ROLLED] - fact[LOAD + 2])
             fact[BOUNCE] = row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = 0.0
@@ -201,6 +194,6 @@ def take_back(rows: Rows, n: int, active: int) -> None:
         k = rows.active[q]
         row, fact = rows.row[k], rows.fact[k]
         if row[STIFFNESS] == 0.0:
-            kept = 1.0 if fact[BOUNCE] != 0.0 else 0.0
+            kept = 1.0 if fact[BOUNCE] > 0.0 else 0.0
             row[IMPULSE], row[IMPULSE + 1] = kept * fact[LOAD], kept * fact[LOAD + 1]
             row[ROLLED] = kept * fact[LOAD + 2]

@@ -141,7 +141,8 @@ def relax(
     usual, reach, gone = p.dt / SUBSTEPS, speed + greatest_pull(rows, n) * p.dt, 0.0
     if alone:
         usual, reach, gone = p.dt, math.inf, 0.5
-    tolerance = max(min(p.sweep_tolerance * (n - 1), SETTLED * speed), p.tolerance * speed)
+    least_change = p.tolerance * (speed + greatest_pull(rows, n) * usual)
+    tolerance = max(min(p.sweep_tolerance * (n - 1), SETTLED * speed), least_change)
     least = max(impact_speed(p), tolerance)
     for s in range(n):
         fenced = fenced or rows.slot[s, BRAKE] > 0.0

@@ -9,11 +9,11 @@ from rigdda.dynamics.equations import load_moment
 from rigdda.dynamics.records import Bodies, Body, Floats, Parameters
 from rigdda.dynamics.rows import (
     BEFORE,
+    BOUNCES,
     BRAKE,
     COS,
     DAMPING,
     FIELD,
-    FIRST,
     FREE,
     HELD,
     LEFT,
@@ -55,7 +55,7 @@ def start_slots(bodies: Bodies, islands: Islands, rows: Rows, island: int, p: Pa
         start_slot(bodies[islands.block_item[first + s]], rows.slot[s], rows.scale[s], p)
     for q in range(rows.slot.shape[1]):
         rows.slot[n, q] = 0.0
-    rows.slot[n, COS], rows.slot[n, FIRST] = 1.0, math.inf
+    rows.slot[n, COS] = 1.0
     for q in range(3):
         rows.scale[n, q] = 0.0
 
@@ -87,7 +87,7 @@ def pull(slots: Floats, n: int, h: float) -> None:
             slot[BEFORE + q] = slot[NOW + q]
             slot[NOW + q] += h * slot[PULL + q]
             slot[FREE + q] = slot[NOW + q]
-        slot[HELD], slot[FIRST] = 0.0, math.inf
+        slot[HELD] = slot[BOUNCES] = 0.0
 
 
 @kernel

@@ -15,8 +15,8 @@ from rigdda.dynamics.rows import (
     BEND,
     BOTH,
     BOUNCE,
+    BOUNCES,
     COHESION,
-    FIRST,
     FLEXIBLE,
     FREE,
     FREE_GAP,
@@ -213,6 +213,5 @@ def end_rows(rows: Rows, n: int, active: int, least: float) -> tuple[bool, bool]
             struck, fact[STRUCK], fact[BOUNCE] = True, 1.0, -fact[REBOUND] * opening
             fact[LOAD] = fact[LOAD + 1] = fact[LOAD + 2] = 0.0
             if fact[BOUNCE] > 0.0:
-                bouncing, closes = True, max(row[GAP], 0.0) / -opening
-                a[FIRST], b[FIRST] = min(a[FIRST], closes), min(b[FIRST], closes)
+                bouncing, a[BOUNCES], b[BOUNCES] = True, 1.0, 1.0
     return struck, bouncing

@@ -81,11 +81,8 @@ def test_a_square_rebounds_by_the_restitution_time_after_time(restitution, first
 
 @pytest.mark.parametrize("dt", accepted(1.0))
 @pytest.mark.parametrize("gap", [0.0, 1e-3, 1e-2, 0.1])
-def test_a_row_of_squares_falls_and_rebounds_as_each_of_them(gap, dt, request):
+def test_a_row_of_squares_falls_and_rebounds_as_each_of_them(gap, dt):
     """Three side by side, dropped together, in 2 s: two rebounds."""
-    if gap == 0.0 and dt == 1e-2:
-        reason = "one of three squares that touch rebounds late"
-        request.applymarker(pytest.mark.xfail(reason=reason, strict=True))
     blocks = [rectangle(1.0, 1.0, 1.93, i * (1.0 + gap)) for i in range(3)]
     sim = on_floor(blocks, dt, restitution=0.8)
     lone = on_floor(blocks[:1], dt, restitution=0.8)

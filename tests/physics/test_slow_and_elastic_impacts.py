@@ -91,7 +91,7 @@ def test_smooth_elastic_impacts_off_the_centre_keep_the_energy(dt):
         ratio = kept(in_space(off_centre(seed), dt, restitution=1.0), 0.6)
         assert ratio < 1.0 + 1e-9, seed
         lost.append(1.0 - ratio)
-    assert np.median(lost) < 0.5 * dt and np.percentile(lost, 95) < 5.0 * dt
+    assert np.median(lost) < 0.5 * dt and np.percentile(lost, 95) < 2.5 * dt
 
 
 @pytest.mark.parametrize("dt", accepted(0.49))
@@ -143,11 +143,8 @@ def in_sequence(gap: float, speeds: list[float], e: float, time: float) -> np.nd
 @pytest.mark.parametrize("dt", [1e-3, 2e-3, 5e-3, 1e-2])
 @pytest.mark.parametrize("count", [3, 5, 10])
 @pytest.mark.parametrize("speed", [0.5, 1.0, 3.0])
-def test_blows_along_a_row_are_handed_on_in_sequence(speed, count, dt, request):
+def test_blows_along_a_row_are_handed_on_in_sequence(speed, count, dt):
     """The first of a row with gaps of 1 mm moves; 0.3 m of its way later the speeds are right."""
-    if (speed, dt) == (3.0, 1e-2) or (speed, count, dt) == (3.0, 3, 5e-3):
-        reason = "several gaps close within a substep"
-        request.applymarker(pytest.mark.xfail(reason=reason, strict=True))
     gap, time = 1e-3, 0.3 / speed
     blocks = [box((1.0 + gap) * i, 0.5) for i in range(count)]
     blocks[0] = box(0.0, 0.5, velocity=(speed, 0.0, 0.0))

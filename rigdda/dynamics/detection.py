@@ -11,7 +11,7 @@ from rigdda.dynamics.constants import (
 )
 from rigdda.dynamics.contact.broad_phase import partners_of_bodies, sweep_and_prune
 from rigdda.dynamics.contact.joint import bond_joints
-from rigdda.dynamics.contact.law import prepare
+from rigdda.dynamics.contact.law import set_properties
 from rigdda.dynamics.contact.links import add_link
 from rigdda.dynamics.contact.narrow_phase import collide_pair, copy_geometry
 from rigdda.dynamics.contact.terrain_phase import collide_terrain
@@ -106,7 +106,7 @@ def collide_block(
     if p.bonded and start:
         bond_joints(contacts, first, count, p)
     for k in range(first, count):
-        prepare(bodies, contacts[k], world.interfaces, start, p)
+        set_properties(bodies, contacts[k], world.interfaces, p)
         totals.deepest[0] = max(totals.deepest[0], -contacts[k].gap)
     return count
 

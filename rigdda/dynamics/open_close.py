@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rigdda.dynamics.arrays import Islands, Matrix, Rows, Scratch, Work
 from rigdda.dynamics.constants import BLOCK_PCG, BOLT, DIRECT, OPEN, PIN, SETTLED, SLIP, SOR, STICK
 from rigdda.dynamics.contact.joint import joint_breaks
+from rigdda.dynamics.contact.law import set_law
 from rigdda.dynamics.contact.links import bend_bolt
 from rigdda.dynamics.equations import (
     add_force,
@@ -32,6 +33,7 @@ from rigdda.dynamics.records import (
     ITERATIONS,
     SOLVER_ITERATIONS,
     SOLVES,
+    STEPS,
     Bodies,
     Contact,
     Contacts,
@@ -181,6 +183,10 @@ def solve_states(
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     n = b1 - b0
+    for item in range(c0, c1):
+        c = contacts[islands.contact_item[item]]
+        if c.kind != BOLT and c.kind != PIN:
+            set_law(bodies, c, counters[STEPS] == 0, p)
     for s in range(n):
         body = bodies[islands.block_item[b0 + s]]
         m.d[s, 0], m.d[s, 1], m.d[s, 2] = body.vx * p.dt, body.vy * p.dt, body.omega * p.dt

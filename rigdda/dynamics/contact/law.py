@@ -132,7 +132,7 @@ def carried_weight(mass_a: float, mass_b: float, p: Parameters) -> float:
 def rest_stiffness(weight: float, c: Contact, p: Parameters) -> float:
     """Return k_n [N/m], which gives the target penetration under the load of a contact.
 
-    The load is at least `weight` [N]. `prepare` never lets the stiffness decrease, because a
+    The load is at least `weight` [N]. `set_properties` never lets the stiffness decrease, because a
     stiffness that decreased with the load would amplify the sway of a stack.
     """
     return max(weight, c.accumulated_normal) / p.penetration
@@ -173,7 +173,6 @@ def set_plain(c: Contact, p: Parameters) -> None:
     contacts. The law does not depend on the approach velocity, so rebound is determined by the step
     and the stiffness.
     """
-    c.kind = PLAIN
     c.stiffness = p.block_weight / p.penetration
     c.kappa = 0.5 * c.stiffness
     c.bias = -2.0 * c.gap
@@ -183,11 +182,8 @@ def set_plain(c: Contact, p: Parameters) -> None:
 
 
 @inlined
-def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: Parameters) -> None:
-    """Set up the law of a contact from its geometry and accumulated forces.
-
-    `start` is whether this is the very first step.
-    """
+def set_properties(bodies: Bodies, c: Contact, interfaces: Interfaces, p: Parameters) -> None:
+    """Set the properties of a contact from its interface and its bodies."""
     a, b = bodies[c.a], bodies[c.b]
     mass_b = b.mass if c.b >= 0 and b.status == AWAKE else 0.0
     weight = carried_weight(a.mass, mass_b, p)
@@ -195,20 +191,28 @@ def prepare(bodies: Bodies, c: Contact, interfaces: Interfaces, start: bool, p: 
     interface = interfaces[a.surface, c.other]
     c.friction, c.restitution = interface.friction, interface.restitution
     c.restitution_speed, c.rolling = interface.restitution_speed, interface.rolling
-    c.radius = rolling_radius(bodies, c) if c.rolling > 0.0 else 0.0
-    c.roll, c.turns = c.accumulated_roll, 0
-    c.lag = c.accumulated_shear
     c.cohesion = c.bond * interface.cohesion
     c.tension = c.bond * interface.tension
     if c.cohesion == 0.0 and c.tension == 0.0:
         c.bond = 0.0
     if c.bond > 0.0:
         c.rolling = 0.0  # the ends of an unbroken joint bear its moment
+    c.radius = rolling_radius(bodies, c) if c.rolling > 0.0 else 0.0
+    c.kind = PLAIN if c.restitution == PLAIN_CONTACT else REST
+
+
+@inlined
+def set_law(bodies: Bodies, c: Contact, start: bool, p: Parameters) -> None:
+    """Set up the law of a contact from its geometry and accumulated forces.
+
+    `start` is whether this is the very first step.
+    """
+    c.roll, c.turns, c.lag = c.accumulated_roll, 0, c.accumulated_shear
     set_arms(bodies, c, 0.5 * p.dt)
     set_velocities(bodies, c, p.dt)
     if c.lag == 0.0:
         c.lag = math.copysign(0.0, -c.us)  # the direction of friction once it slips
-    if c.restitution == PLAIN_CONTACT:
+    if c.kind == PLAIN:
         set_plain(c, p)
     elif c.state != OPEN:
         set_rest(c, p)

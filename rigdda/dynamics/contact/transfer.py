@@ -31,11 +31,16 @@ def fits_another(contacts: Contacts, k: int, low: int, high: int, was: Contact) 
 @inlined
 def recall_from(
     contacts: Contacts, k: int, new_low: int, new_high: int, old: Contacts, low: int, high: int,
-    b: int, sign: float,
-) -> bool:  # fmt: skip
-    """Transfer the data of the same closed contact among old[low:high] to contact k, if any."""
+    place: int, b: int, sign: float,
+) -> int:  # fmt: skip
+    """Transfer the data of the same closed contact among old[low:high] to contact k, if any.
+
+    The search starts at entry `place`, because contacts mostly keep their order. Returns the entry
+    of the contact, or -1.
+    """
     c = contacts[k]
-    for m in range(low, high):
+    for tried in range(high - low):
+        m = place + tried if place + tried < high else place + tried - (high - low)
         was = old[m]
         if was.b != b or was.key != c.key or was.state == OPEN:
             continue
@@ -49,8 +54,8 @@ def recall_from(
         c.accumulated_normal, c.accumulated_shear = was.accumulated_normal, was.accumulated_shear
         c.accumulated_roll = was.accumulated_roll
         c.stiffness, c.bond = was.stiffness, was.bond
-        return True
-    return False
+        return m
+    return -1
 
 
 @inlined
@@ -65,6 +70,7 @@ def recall(
     Bodies exchange their roles (a, b) when one of them falls asleep or wakes, so a pair is looked
     up both ways. Its forces keep their signs, because the normal and shear directions both reverse.
     """
+    place = first[contacts[low].a] if high > low else 0
     for k in range(low, high):
         c = contacts[k]
         c.state = OPEN
@@ -74,9 +80,13 @@ def recall(
         if c.gap > margin:
             continue
         a, b = c.a, c.b
-        found = recall_from(contacts, k, low, high, old, first[a], first[a + 1], b, 1.0)
-        if not found and b != TERRAIN:
-            recall_from(contacts, k, low, high, old, first[b], first[b + 1], a, -1.0)
+        start, end = first[a], first[a + 1]
+        place = place if place < end else start
+        found = recall_from(contacts, k, low, high, old, start, end, place, b, 1.0)
+        if found >= 0:
+            place = found + 1
+        elif b != TERRAIN:
+            recall_from(contacts, k, low, high, old, first[b], first[b + 1], first[b], a, -1.0)
 
 
 @kernel

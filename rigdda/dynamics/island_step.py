@@ -268,8 +268,6 @@ def account_contacts(
     """Add the work of contacts to the ledger and the barriers, and note which bodies touch."""
     for item in range(low, high):
         c, row = contacts[islands.contact_item[item]], rows.fact[rows.place[item]]
-        if c.state == OPEN:
-            continue
         support = c.kind == BOLT or c.kind == PIN
         block, barrier = barrier_contact(monitors, c.a, c.b)
         if barrier >= 0:
@@ -281,6 +279,8 @@ def account_contacts(
         else:
             ledger[0] += row[WORK + 1]
             ledger[1] += row[WORK]
+        if c.state == OPEN:  # impulses that a rebound takes back do work as well
+            continue
         if len(monitors.target) > 0:
             press(c, monitors, p.dt)
         bodies[c.a].touching = True

@@ -2,8 +2,9 @@
 
 A rebound takes no time. It changes the velocities of the bodies that were struck, and of the bodies
 that they touch. Only contacts of bodies that were struck take part. Those with a gap cannot close
-in it, at any velocity. They close in a later substep, where they may have an impact of their own,
-as may the contacts of the bodies that a struck body pushes.
+in it, at any velocity; if they had no impact of their own, the impulses by which the plastic impact
+slowed them are taken back. They close in a later substep, where they may have an impact, as may the
+contacts of the bodies that a struck body pushes.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from rigdda.dynamics.rows import (
     SHEAR,
     STIFFNESS,
     STRENGTH,
+    TAKEN_BACK,
     TENSION,
     along_six,
     place_row,
@@ -66,12 +68,15 @@ def start_rebound(rows: Rows, active: int, h: float, touch: float) -> None:
         k = rows.active[q]
         i, j = rows.row_i[k], rows.row_j[k]
         row, fact, a, b = rows.row[k], rows.fact[k], rows.slot[i], rows.slot[j]
+        free = row[STIFFNESS] == 0.0 and fact[STRENGTH + 1] == 0.0 and fact[STRENGTH] < math.inf
+        if free and row[GAP] > touch and row[IMPULSE] > 0.0 and fact[BOUNCE] == 0.0:
+            fact[BOUNCE] = TAKEN_BACK
         place_row(row, fact, rows.form[k], a, b, rows.scale[i], rows.scale[j])
         aim_row(row, fact, a, b, h, h, touch)
         if row[STIFFNESS] > 0.0:  # a spring keeps its impulse during the rebound
             row[KEEP] = row[KEEP_SHEAR] = 1.0
             row[GAIN] = row[GAIN_SHEAR] = 0.0
-        elif row[GAP] > touch and fact[STRENGTH + 1] == 0.0 and fact[STRENGTH] < math.inf:
+        elif free and (row[GAP] > touch or fact[BOUNCE] == TAKEN_BACK):
             row[AIM] = -SPEED_LIMIT
         if rows.face[k] == 0:
             couple_face(rows.row[k - 1], row)
@@ -99,7 +104,7 @@ def work_from(rows: Rows, active: int, first: int) -> float:
         spin = row[ROLL] * (a[first + 2] + a[NOW + 2])
         spin += row[ROLL + 1] * (b[first + 2] + b[NOW + 2])
         normal, shear, rolled = row[IMPULSE], row[IMPULSE + 1], row[ROLLED]
-        if fact[BOUNCE] > 0.0:
+        if fact[BOUNCE] != 0.0:
             normal, shear = normal - fact[LOAD], shear - fact[LOAD + 1]
             rolled -= fact[LOAD + 2]
         work += 0.5 * (normal * opening + shear * slip + rolled * spin)
@@ -122,13 +127,14 @@ def aim_rebound(rows: Rows, n: int, active: int, share: float) -> None:
         if row[STIFFNESS] > 0.0:
             continue
         row[ROLL_LIMIT] = row[ROLLING] * max(fact[LOAD], 0.0)
-        if fact[BOUNCE] > 0.0:
+        if fact[BOUNCE] != 0.0:
             row[IMPULSE], row[IMPULSE + 1] = fact[LOAD], fact[LOAD + 1]
             row[ROLLED] = fact[LOAD + 2]
-            row[ROLL_LIMIT] *= 1.0 + share * fact[REBOUND]
-            row[AIM], row[TENSION] = share * fact[BOUNCE], -fact[LOAD]  # in sum no tension
         else:
             row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = 0.0
+        if fact[BOUNCE] > 0.0:
+            row[ROLL_LIMIT] *= 1.0 + share * fact[REBOUND]
+            row[AIM], row[TENSION] = share * fact[BOUNCE], -fact[LOAD]  # in sum no tension
 
 
 @kernel
@@ -174,7 +180,7 @@ def end_rebound(rows: Rows, active: int) -> None:
         if row[STIFFNESS] > 0.0:
             continue
         a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
-        if fact[BOUNCE] > 0.0:
+        if fact[BOUNCE] != 0.0:
             normal, shear = row[IMPULSE] - fact[LOAD], row[IMPULSE + 1] - fact[LOAD + 1]
             count_row(row, fact, a, b, normal, shear, row[ROLLED] - fact[LOAD + 2])
             fact[BOUNCE] = row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = 0.0
@@ -194,6 +200,6 @@ def take_back(rows: Rows, n: int, active: int) -> None:
         k = rows.active[q]
         row, fact = rows.row[k], rows.fact[k]
         if row[STIFFNESS] == 0.0:
-            kept = 1.0 if fact[BOUNCE] > 0.0 else 0.0
+            kept = 1.0 if fact[BOUNCE] != 0.0 else 0.0
             row[IMPULSE], row[IMPULSE + 1] = kept * fact[LOAD], kept * fact[LOAD + 1]
             row[ROLLED] = kept * fact[LOAD + 2]

@@ -50,8 +50,8 @@ VERTEX, FACE, DIRECTION, FREE_GAP, FREE_SHEAR, STRENGTH = 0, 2, 4, 6, 7, 8
 
 # RADIUS: R [m]. RESTITUTION [-], which has fallen to half at RESTITUTION_SPEED [m/s]. REBOUND:
 # restitution of the impact in this substep [-]. BOUNCE: opening velocity after it [m/s], 0 without
-# one. STRUCK: 1 after an impact in this step, else 0. LOAD, + 1 and + 2: normal, shear and rolling
-# impulse before a rebound [N s].
+# one, TAKEN_BACK of a contact whose impulse a rebound takes back. STRUCK: 1 after an impact in this
+# step, else 0. LOAD, + 1 and + 2: normal, shear and rolling impulse before a rebound [N s].
 RADIUS, RESTITUTION, RESTITUTION_SPEED, REBOUND, BOUNCE, STRUCK, LOAD = 10, 11, 12, 13, 14, 15, 16
 
 # SUM, + 1 and + 2: sums of these impulses since the start of the step [N s]. WORK: work of the
@@ -80,6 +80,8 @@ BRAKE, MOVES, LEFT, START = 20, 21, 22, 23
 BOUNCES = 24
 
 SLOT_COLUMNS = 25
+
+TAKEN_BACK = -1.0
 
 # rows.form: the vertex belongs to a, to b, or the contact is a bolt between two points
 OF_A, OF_B, BETWEEN = 0, 1, 2

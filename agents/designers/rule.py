@@ -157,7 +157,9 @@ def judge(problem: DesignProblem, envelope: DesignEnvelope) -> RuleAnswer:
             demand, fence = dear
             price = f"{problem.site.capital((fence,)):,.0f} EUR/m, more than max_cost"
             reason = f"a fence that fits, {fence.label} at {fence.x:.1f} m, costs {price}"
-            return _instead(menu, envelope, asked, reason, FenceCheck.of(problem.site, fence, demand))
+            return _instead(
+                menu, envelope, asked, reason, FenceCheck.of(problem.site, fence, demand)
+            )
     near = nearest(problem, asked)
     return _instead(menu, envelope, asked, why(problem, asked), near)
 

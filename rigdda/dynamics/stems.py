@@ -32,9 +32,7 @@ def room_for(scene: Scene) -> int:
 def pack_stems(scene: Scene) -> Stems:
     """Return the stems of the blocks of a scene in arrays with room for more."""
     shape = (len(scene.stems), room_for(scene))
-    stems = Stems(
-        np.zeros(shape, dtype=STEM).view(np.recarray), np.zeros(shape[0], dtype=np.int64)
-    )
+    stems = Stems(np.zeros(shape, dtype=STEM).view(np.recarray), np.zeros(shape[0], dtype=np.int64))
     write_stems(scene.stems, scene, stems)
     return stems
 

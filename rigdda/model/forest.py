@@ -16,6 +16,7 @@ the publications.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -74,7 +75,9 @@ class Forest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ] = 0.0
     conifers: Annotated[
         float,
-        about("Share of conifers among the stems. The others are broadleaved.", "-", ge=0.0, le=1.0),
+        about(
+            "Share of conifers among the stems. The others are broadleaved.", "-", ge=0.0, le=1.0
+        ),
     ] = 1.0
     height: Annotated[
         float,
@@ -92,6 +95,11 @@ class Forest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.end <= self.start:
             mend = f"let it end beyond {self.start:g}, where it begins"
             raise BadInput("forest: end", self.end, mend)
+
+    @property
+    def basal_area(self) -> float:
+        """Cross-section of its stems at breast height [m2/ha]."""
+        return self.stems * 0.25 * math.pi * (self.dbh**2 + self.dbh_sd**2)
 
     def struck(self, width: float) -> float:
         """Return the mean number of stems that a block of this width [m] strikes [1/m]."""

@@ -583,7 +583,8 @@ def _odd_forest(site: Site) -> Iterator[str]:
         if one.end <= first:
             yield f"{where}.end = {one.end:g}: all rock starts farther downhill, at x = {first:g} m"
         if one.start < site.road.end and one.end > site.road.start:
-            yield f"{where}: it reaches onto the road, x = {site.road.start:g} to {site.road.end:g} m"
+            road = f"x = {site.road.start:g} to {site.road.end:g} m"
+            yield f"{where}: it reaches onto the road, {road}"
 
 
 def _spans(site: Site) -> Iterator[tuple[float, float]]:
@@ -956,7 +957,7 @@ def _draw_forest(axes: Axes, site: Site, tall: float) -> None:
         x = np.linspace(one.start, one.end, count)
         foot = np.array([site.profile.height(at) for at in x.tolist()])
         axes.vlines(x, foot, foot + tall, color=WOOD, linewidth=1.6, zorder=2.5,
-                    label="forest" if i == 0 else None)  # fmt: skip
+                    label="forest" if i == 0 else "")  # fmt: skip
 
 
 def _names(site: Site) -> list[Label]:

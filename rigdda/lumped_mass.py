@@ -90,8 +90,8 @@ def lumped(
     Raises
     ------
     BadInput
-        If the site has a forest, a barrier is not an earthwork or mesh or does not fit the site, the
-        ground overhangs, there are no seeds, or `Site.draw` fails.
+        If the site has a forest, a barrier is not an earthwork or mesh or does not fit the site,
+        the ground overhangs, there are no seeds, or `Site.draw` fails.
     """
     site, layout = as_site(site), as_layout(layout)
     if site.forest:

@@ -188,7 +188,7 @@ def facts(site: Site) -> list[str]:
 
 def _forests(site: Site) -> Iterator[str]:
     """Yield what stands in each forest, and how often it is struck."""
-    size = max(_size(site, event) for event in site.events)
+    size = max(event.block_size(site.source(event.source)) for event in site.events)
     for one in site.forest:
         energy = most_energy(np.array([one.dbh]), np.array([one.conifers >= 0.5]))[0]
         often = one.struck(size)

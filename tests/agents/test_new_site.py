@@ -602,7 +602,7 @@ def test_a_forest_is_told_with_what_it_does(slope):
         line for line in site_check.facts(replace(slope, forest=(wood,))) if "forest" in line
     ]
     assert "forest at x = 30 to 90 m: 400 stems a hectare of 0.3 m, a basal area of 28.3 m2" in line
-    assert "a block 1 m wide strikes one in every 19.2 m, which takes at most 93 kJ" in line
+    assert "a block 0.68 m wide strikes one in every 25.5 m, which takes at most 93 kJ" in line
 
 
 def test_a_closure_for_fifty_euros_looks_odd(slope):

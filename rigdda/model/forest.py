@@ -89,6 +89,7 @@ class Forest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             le=60.0,
         ),
     ] = 5.0
+    name: Annotated[str, about("Name of the forest, unique among those of the site.")] = "forest"
 
     def __post_init__(self) -> None:
         fields.check(self, "forest: ")

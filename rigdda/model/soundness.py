@@ -238,6 +238,7 @@ def _check_piece(
 
 
 def _check_forest(site: SiteTables) -> None:
+    check_names("forest", (forest.name for forest in site.forest))
     low, high = site.slope.points[0][0], site.slope.points[-1][0]
     for i, forest in enumerate(site.forest):
         for name in ("start", "end"):

@@ -23,6 +23,7 @@ from rigdda import (
     release,
     release_outcome,
 )
+from rigdda.agents.parameters import set_numbers
 from rigdda.model import forest
 from rigdda.model.scene import scene_from_json, scene_to_json
 from rigdda.releases import Batch
@@ -255,6 +256,17 @@ class TestSites:
             for site in (TALUS, wooded(250.0), wooded(700.0), wooded(2000.0))
         ]
         assert reach[0] > reach[1] > reach[2] > reach[3]
+
+    def test_the_number_of_stems_is_a_parameter(self) -> None:
+        """`rigdda fit` and `rigdda sensitivity` change numbers of a site by their paths."""
+        site = set_numbers(wooded(500.0, name="upper"), ["forest.upper.stems"], [300.0])
+        assert site.forest == (replace(wooded(300.0).forest[0], name="upper"),)
+
+    def test_two_forests_have_different_names(self) -> None:
+        (wood,) = wooded(300.0).forest
+        with pytest.raises(BadInput, match="give each a unique name"):
+            replace(TALUS, forest=(wood, wood))
+        assert len(replace(TALUS, forest=(wood, replace(wood, name="young"))).forest) == 2
 
     def test_the_lumped_mass_model_refuses_a_forest(self) -> None:
         with pytest.raises(BadInput, match="points do not strike stems"):

@@ -12,7 +12,7 @@ import msgspec
 from rigdda import Barrier, Ditch, Fence, Layout
 from rigdda.barriers import standing
 from rigdda.envs import DesignProblem, design_envelope
-from rigdda.envs.barrier_formulas import BarrierCheck, checks_of, fence_check
+from rigdda.envs.barrier_formulas import BarrierCheck, checks_of
 from rigdda.envs.fence_checks import FenceCheck, demand_at
 from rigdda.model.barrier_zone import BarrierZone
 
@@ -81,7 +81,7 @@ def check_layout(problem: DesignProblem, layout: Layout, seed: int = 0) -> Layou
             if demand is None:
                 idle.append(f"{label}, at {barrier.x:.1f} m")
         if demand is not None and isinstance(barrier, Fence):
-            fences.append(fence_check(site, barrier, demand))
+            fences.append(FenceCheck.of(site, barrier, demand))
         table += [c._replace(barrier=label) for c in checks_of(site, barrier, demand)]
     return LayoutChecks(tuple(fences), tuple(table), tuple(idle))
 

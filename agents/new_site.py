@@ -20,6 +20,7 @@ from rigdda.model import loose_blocks
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.block import convex_polygon
 from rigdda.model.existing import Existing
+from rigdda.model.forest import Forest
 from rigdda.model.grounds import GROUNDS, USUAL
 from rigdda.model.partial_factors import PartialFactors
 from rigdda.model.prices import Consequences, Prices
@@ -73,6 +74,9 @@ JOINTS = ((70.0, 1.0), (-20.0, 1.0))
 
 TRAFFIC = (2000.0, 60.0, 100.0)
 """Placeholders of the vehicles per day, their speed [km/h] and the length of the road [m]."""
+
+FOREST = (400.0, 0.3, 0.1)
+"""Placeholders of the stems on a hectare, their diameter and its standard deviation [m]."""
 
 FENCE, FENCE_ROOM, REMOVAL = (250, 2.0), 3.0, 100.0
 """Placeholders of a fence that stands already: class [kJ] and height [m], distance from the lower
@@ -274,6 +278,7 @@ class _Draft:
                 },
             ),
             _traffic(),
+            self._forest(),
             self._existing(),
         ]
 
@@ -497,6 +502,16 @@ class _Draft:
             "removal": (REMOVAL, PLACEHOLDER),
         }
         return Part("[[existing]]", Existing, values, template=True)
+
+    def _forest(self) -> Part:
+        """Return the template of a forest above the barrier zone, or on it if there is no room."""
+        start = float(self.x[0])
+        ends = (start, self.zone[0]) if self.zone[0] > start else self.zone
+        edges = dict(zip(("start", "end"), ((at, PLACEHOLDER) for at in ends), strict=True))
+        usual = Forest(*ends, *FOREST)
+        values = {name: (getattr(usual, name), PLACEHOLDER) for name in ("stems", "dbh", "dbh_sd")}
+        kept = {name: (getattr(usual, name), DEFAULT) for name in ("conifers", "height")}
+        return Part("[[forest]]", Forest, edges | values | kept, template=True)
 
     def _grounds(self) -> tuple[str, list[dict[str, Any]], dict[str, str]]:
         """Return the surface of all that is not listed, the stretches, and the grounds."""

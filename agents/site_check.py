@@ -29,6 +29,7 @@ from rigdda.files import read
 from rigdda.geometry import polygon_properties
 from rigdda.model import site_names
 from rigdda.model.existing import Existing
+from rigdda.model.forest import most_energy
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.joints import spaced_area
 from rigdda.model.site_tables import Origin
@@ -42,6 +43,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 Floats = NDArray[np.float64]
+
+DRAWN_STEMS, WOOD = 60, "#2e7d32"
+"""Stems on the whole length of the picture, and their colour."""
 
 Written = Mapping[str, Mapping[str, Any]]
 """Tables of events as they are written, by the name of the event."""
@@ -60,6 +64,12 @@ LIGHT, HEAVY = 1500.0, 3500.0
 
 OFTEN = 5.0
 """Rate from which on a return period may be meant [1/year per 100 m]."""
+
+SPARSE, DENSE = 2.0, 90.0
+"""Basal areas beyond which a forest is doubted [m2/ha]; dense protection forest has about 50."""
+
+HIGH_UP = 15.0
+"""Height above which stems are not thought to take their energy [m]."""
 
 HUGE = 20.0
 """Volume of a block above which an area may have been meant for one [m3]."""
@@ -168,11 +178,27 @@ def facts(site: Site) -> list[str]:
         "ground: " + "; ".join(_grounds(site)),
         f"barriers may stand at x = {rooms}, up to {zone.max_height:g} m high; "
         + _fences(site),
+        *_forests(site),
         *_standing(site),
         *(_source(source) for source in site.sources),
         f"{total:.3g} events a year on 100 m of slope, {_period(total)}; design events: "
         + (", ".join(design) or "none (design = true), so that no target can be set"),
     ]  # fmt: skip
+
+
+def _forests(site: Site) -> Iterator[str]:
+    """Yield what stands in each forest, and how often it is struck."""
+    size = max(event.block_size(site.source(event.source)) for event in site.events)
+    for one in site.forest:
+        energy = most_energy(np.array([one.dbh]), np.array([one.conifers >= 0.5]))[0]
+        often = one.struck(size)
+        yield (
+            f"forest at x = {one.start:g} to {one.end:g} m: {one.stems:g} stems a hectare of "
+            f"{one.dbh:g} m, a basal area of {one.basal_area:.3g} m2 a hectare; a block {size:.2g} "
+            "m wide strikes one "
+            + (f"in every {1.0 / often:.3g} m" if often > 0.0 else "never")
+            + f", which takes at most {1e-3 * energy:.3g} kJ if it is of the mean diameter"
+        )
 
 
 def _standing(site: Site) -> Iterator[str]:
@@ -423,6 +449,7 @@ def oddities(
         *_odd_profile(site),
         *_odd_surfaces(site),
         *_odd_zone(site),
+        *_odd_forest(site),
         *_odd_existing(site),
         *_odd_traffic(site, written),
         *_odd_prices(site),
@@ -530,6 +557,44 @@ def _odd_zone(site: Site) -> Iterator[str]:
                 f"barrier_zone.{name} = {value:g}: the largest block is {size:.1f} m long, so that "
                 "the best barrier will lie on this bound; allow more if it can be built"
             )
+
+
+def _odd_forest(site: Site) -> Iterator[str]:
+    """Yield what is odd about the forest."""
+    first = min(start for start, _ in _spans(site))
+    for i, one in enumerate(site.forest):
+        area, where = one.basal_area, f"forest[{i}]"
+        if not SPARSE <= area <= DENSE:
+            yield (
+                f"{where}: {one.stems:g} stems of {one.dbh:g} m are a basal area of {area:.3g} m2 "
+                f"a hectare, and that of a forest is {SPARSE:g} to {DENSE:g}; is `stems` a number "
+                "on a hectare, and `dbh` a diameter in metres?"
+            )
+        if one.dbh_sd > one.dbh:
+            yield (
+                f"{where}.dbh_sd = {one.dbh_sd:g}: it is more than the mean diameter, "
+                f"{one.dbh:g} m; is it a standard deviation in metres?"
+            )
+        if one.height > HIGH_UP:
+            yield (
+                f"{where}.height = {one.height:g}: the energy that a stem takes was measured near "
+                "the ground; higher up it is less"
+            )
+        if one.end <= first:
+            yield f"{where}.end = {one.end:g}: all rock starts farther downhill, at x = {first:g} m"
+        if one.start < site.road.end and one.end > site.road.start:
+            road = f"x = {site.road.start:g} to {site.road.end:g} m"
+            yield f"{where}: it reaches onto the road, {road}"
+
+
+def _spans(site: Site) -> Iterator[tuple[float, float]]:
+    """Yield the chainages between which each source lies [m]."""
+    for source in site.sources:
+        if source.band is not None:
+            yield source.band
+        else:
+            x = source.outline[:, 0]
+            yield float(x.min()), float(x.max())
 
 
 def _odd_existing(site: Site) -> Iterator[str]:
@@ -830,6 +895,7 @@ def draw(path: str | os.PathLike[str], site: Site) -> None:
         bottom = float(points[:, 1].min() - 0.12 * tall)
         _draw_ground(axes, site, bottom)
         _draw_sources(axes, site)
+        _draw_forest(axes, site, 0.05 * tall)
         _draw_places(axes, site, 0.03 * tall)
         axes.set_aspect("equal")
         axes.set(
@@ -881,6 +947,17 @@ def _draw_sources(axes: Axes, site: Site) -> None:
     for i, corners in enumerate(sources(site)):
         axes.plot(*corners.T, color=STARTS, linewidth=3.0, zorder=3.2, solid_capstyle="butt",
                   label="rock starts here" if i == 0 else None)  # fmt: skip
+
+
+def _draw_forest(axes: Axes, site: Site, tall: float) -> None:
+    """Draw a stem [m] at each of some even places of the forests; the places are no survey."""
+    length = float(np.ptp(np.array(site.slope.points)[:, 0]))
+    for i, one in enumerate(site.forest):
+        count = max(2, round(DRAWN_STEMS * (one.end - one.start) / length))
+        x = np.linspace(one.start, one.end, count)
+        foot = np.array([site.profile.height(at) for at in x.tolist()])
+        axes.vlines(x, foot, foot + tall, color=WOOD, linewidth=1.6, zorder=2.5,
+                    label="forest" if i == 0 else "")  # fmt: skip
 
 
 def _names(site: Site) -> list[Label]:

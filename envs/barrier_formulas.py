@@ -78,11 +78,6 @@ class BarrierCheck(NamedTuple):
         return self.use <= self.limit + 1e-9
 
 
-def fence_check(site: Site, fence: Fence, demand: Demand) -> FenceCheck:
-    """Return the check of a fence by the rule, on a site."""
-    return FenceCheck(fence, demand, site.road.start - fence.end)
-
-
 def checks_of(site: Site, barrier: Barrier, demand: Demand | None) -> Iterator[BarrierCheck]:
     """Yield the checks of a barrier.
 
@@ -101,7 +96,7 @@ def checks_of(site: Site, barrier: Barrier, demand: Demand | None) -> Iterator[B
     elif demand is None:
         return
     elif isinstance(barrier, Fence):
-        yield from _fence(fence_check(site, barrier, demand))
+        yield from _fence(FenceCheck.of(site, barrier, demand))
     elif isinstance(barrier, GravityWall | Embankment):
         yield from _structure(site, barrier, demand)
 

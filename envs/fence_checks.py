@@ -8,13 +8,14 @@ it does not depend on the station.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from rigdda import Fence
+from rigdda import Fence, Site
 from rigdda.barriers.fence import FENCE_CLASSES, FenceClass
 from rigdda.envs.design_envelope import DesignEnvelope, EventEnvelope
 from rigdda.envs.quantiles import Quantile
@@ -181,11 +182,21 @@ class FenceCheck:
         What is demanded where it stands.
     clearance : float
         Distance from its downhill face to the road [m].
+    slope : float
+        Inclination of the ground that falls towards it, over its own height uphill of it [rad].
     """
 
     fence: Fence
     demand: Demand
     clearance: float
+    slope: float
+
+    @classmethod
+    def of(cls, site: Site, fence: Fence, demand: Demand) -> FenceCheck:
+        """Return the check of a fence on a site."""
+        clear = site.road.start - fence.end
+        slope = site.profile.inclination(fence.x - 0.5 * fence.height, fence.height)
+        return cls(fence, demand, clear, float(slope))
 
     @property
     def factors(self) -> PartialFactors:
@@ -217,6 +228,16 @@ class FenceCheck:
     def height_use(self) -> float:
         """Needed height divided by the height [-]."""
         return self.demand.height() / self.fence.height
+
+    @property
+    def nominal_height(self) -> float:
+        """Height that a kit needs, measured normal to the slope as EAD 340059 does [m].
+
+        The height of the centre of the block is reduced by the cosine of the inclination of the
+        ground; the freeboard, which is a size of the block, is not.
+        """
+        high = self.demand.high
+        return high.design_height() * math.cos(self.slope) + high.freeboard
 
     @property
     def elongation_use(self) -> float:
@@ -301,9 +322,15 @@ class FenceCheck:
             SheetRow("design height", "h_d", high.design_height(), "m", "h g_tr g_dp g_h"),
             SheetRow("freeboard", "f", high.freeboard, "m",
                      f"at least {f.freeboard:g} and the mean radius, {high.event.radius:.2f}"),
-            SheetRow("needed height", "h_d + f", high.needed_height(), "m", ""),
-            SheetRow("height of the fence", "H", self.fence.height, "m", ""),
+            SheetRow("needed height", "h_d + f", high.needed_height(), "m", "vertical"),
+            SheetRow("height of the fence", "H", self.fence.height, "m", "vertical"),
             SheetRow("utilisation, height", "(h_d + f) / H", use, "-", _verdict(use)),
+            SheetRow("inclination of the ground", "b", math.degrees(self.slope), "deg",
+                     "over the height of the fence, uphill of it"),
+            SheetRow("bounce height, normal to the slope", "h cos b",
+                     high.height.value * math.cos(self.slope), "m", "not used by this check"),
+            SheetRow("nominal height of a kit", "h_d cos b + f", self.nominal_height, "m",
+                     "normal to the slope, as in EAD 340059; not used by this check"),
         ]  # fmt: skip
 
     def _elongation_rows(self) -> list[SheetRow]:

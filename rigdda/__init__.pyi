@@ -23,6 +23,7 @@ from .model import grounds
 from .model.block import Block
 from .model.corridor import Corridor, CorridorSection
 from .model.existing import Existing
+from .model.forest import Forest
 from .model.loads import BodyForce, Bolt, FixedPoint, LineLoad, PointLoad
 from .model.outcome import BarrierOutcome, Outcome
 from .model.prices import Bill, Consequences, Prices
@@ -59,6 +60,7 @@ __all__ = [
     "Existing",
     "Fence",
     "FixedPoint",
+    "Forest",
     "GravityWall",
     "Layout",
     "LineLoad",

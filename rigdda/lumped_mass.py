@@ -90,10 +90,13 @@ def lumped(
     Raises
     ------
     BadInput
-        If a barrier is not an earthwork or mesh or does not fit the site, the ground overhangs,
-        there are no seeds, or `Site.draw` fails.
+        If the site has a forest, a barrier is not an earthwork or mesh or does not fit the site,
+        the ground overhangs, there are no seeds, or `Site.draw` fails.
     """
     site, layout = as_site(site), as_layout(layout)
+    if site.forest:
+        mend = "remove it, or use the block model: points do not strike stems"
+        raise BadInput("forest", f"{len(site.forest)} forests", mend)
     new = len(layout)
     layout = site.as_built(layout)
     for i, barrier in enumerate(layout):

@@ -34,6 +34,7 @@ PASSAGE = np.dtype(
         ("vy", "f8"),
         ("omega", "f8"),
         ("height", "f8"),
+        ("normal", "f8"),
         ("translation", "f8"),
         ("rotation", "f8"),
         ("mass", "f8"),
@@ -46,7 +47,9 @@ PASSAGE = np.dtype(
 release: index of the release. event: index of the event in `Site.event_names`. station: index of
 the station. time: since the release [s]. vx, vy: velocity of the centroid, downhill and upwards
 [m/s]. omega: angular velocity [rad/s]. height: of the centroid above the ground at the station,
-vertically [m]. translation, rotation: kinetic energy [J]. mass [kg], width: length of the block
+vertically [m]. normal: the same at right angles to the slope, height times the cosine of the
+inclination of the ground between half a width uphill and half a width downhill of the station [m].
+translation, rotation: kinetic energy [J]. mass [kg], width: length of the block
 along the road, the root of its cross-section [m]. radius: of the circumscribed circle about the
 centroid [m]. Energies and masses are those of the whole block; divided by `width` they are per
 metre of road."""
@@ -290,6 +293,10 @@ class _Watch:
         out["time"], out["height"] = crossed["time"], crossed["height"]
         out["vx"], out["vy"], out["omega"] = velocity.T
         out["mass"], out["width"], out["radius"] = mass[block], width[block], radius[block]
+        ground = simulation.scene.smooth_ground
+        assert ground is not None  # a site has one
+        slope = ground.inclination(self._lines[out["station"]], out["width"])
+        out["normal"] = out["height"] * np.cos(slope)
         out["translation"] = 0.5 * out["mass"] * crossed["speed"] ** 2
         whole = crossed["energy"] * out["width"]
         out["rotation"] = np.maximum(whole - out["translation"], 0.0)

@@ -140,7 +140,7 @@ class SingleReleases:
         most = longest_step_of_single(area, self._gravity)
         dt = site.motion.dt / max(1, math.ceil(site.motion.dt / most))
         arrays = self._blocks.get(dt)
-        if arrays is None:
+        if arrays is None or not arrays.has_room(drawn.stems):
             if not clearly_convex(block.vertices):
                 return None
             arrays = self._packed(drawn, dt)
@@ -153,7 +153,7 @@ class SingleReleases:
             for bears, barrier in zip(resistances, barriers, strict=True)
         ]
         steps = max(1, round(site.motion.duration / dt))
-        found = arrays.run(block, meetings, forces, limits, steps)
+        found = arrays.run(block, meetings, forces, limits, drawn.stems, steps)
         if found is None:
             return None
         return self._ending(found, area, block.density, barriers, resistances)
@@ -335,7 +335,9 @@ class Batch:
         if (drawn.friction_deg, drawn.strengths) != (first.friction_deg, first.strengths):
             surfaces, interfaces = self._site.strength(drawn)
         barriers = [b.for_width(drawn.width) for b in self._standing]
-        return base.with_rock(drawn.blocks, surfaces, interfaces, barriers, drawn.roughness)
+        return base.with_rock(
+            drawn.blocks, surfaces, interfaces, barriers, drawn.roughness, drawn.stems
+        )
 
     def simulation(self, scene: Scene) -> Simulation:
         """Return the simulation of such a scene; it invalidates the previous one."""

@@ -336,3 +336,33 @@ def test_rock_far_below_the_ground_is_refused(tmp_path):
     sunk = [[x, y - 500.0] for x, y in corners]
     error = refused(tmp_path, "quick", old, f"polygon = {sunk}")
     assert error.field.startswith("sources.mass.polygon[") and "raise it" in error.mend
+
+
+FOREST = """[[forest]]
+start = 4.0
+end = 9.0
+stems = 400.0
+dbh = 0.3
+
+[motion]"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "mend"),
+    [
+        ("stems = 400.0", "stems = 50000", "forest[0].stems", "at most 20000 [1/ha]"),
+        ("stems = 400.0", "", "forest[0].stems", "Number of stems on a hectare"),
+        ("dbh = 0.3", "dbh = 4.0", "forest[0].dbh", "at most 2.5 [m]"),
+        ("dbh = 0.3", "dbh = 30", "forest[0].dbh", "at most 2.5 [m]"),
+        ("dbh = 0.3", "dbh = 0.3\nconifers = 80", "forest[0].conifers", "at most 1"),
+        ("dbh = 0.3", "dbh = 0.3\nspecies = 1", "forest[0].species", "there is no such key"),
+        ("end = 9.0", "end = 3.0", "forest: end", "let it end beyond 4, where it begins"),
+        ("end = 9.0", "end = 900.0", "forest[0].end", "keep it on the slope: at least -15"),
+        ("start = 4.0", "start = -40.0", "forest[0].start", "keep it on the slope: at least -15"),
+    ],
+)
+def test_a_forest_that_cannot_be_is_refused(old, new, field, mend, tmp_path):
+    assert old in FOREST
+    error = refused(tmp_path, "verge", "[motion]", FOREST.replace(old, new, 1))
+    assert error.field == field
+    assert mend in str(error)

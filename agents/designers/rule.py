@@ -149,7 +149,7 @@ def judge(problem: DesignProblem, envelope: DesignEnvelope) -> RuleAnswer:
     best = choose(menu, asked)
     if best is not None:
         demand, fence = best
-        return RuleAnswer((fence,), NAME, "", _check(problem, fence, demand), envelope)
+        return RuleAnswer((fence,), NAME, "", FenceCheck.of(problem.site, fence, demand), envelope)
     if problem.max_cost is not None:
         free = DesignProblem(problem.site, kinds=problem.kinds, zone=(zone.start, zone.end))
         dear = choose(Menu(free), asked)
@@ -157,7 +157,9 @@ def judge(problem: DesignProblem, envelope: DesignEnvelope) -> RuleAnswer:
             demand, fence = dear
             price = f"{problem.site.capital((fence,)):,.0f} EUR/m, more than max_cost"
             reason = f"a fence that fits, {fence.label} at {fence.x:.1f} m, costs {price}"
-            return _instead(menu, envelope, asked, reason, _check(problem, fence, demand))
+            return _instead(
+                menu, envelope, asked, reason, FenceCheck.of(problem.site, fence, demand)
+            )
     near = nearest(problem, asked)
     return _instead(menu, envelope, asked, why(problem, asked), near)
 
@@ -248,10 +250,6 @@ def _last_places(problem: DesignProblem, envelope: DesignEnvelope) -> Iterator[D
                 yield demand
 
 
-def _check(problem: DesignProblem, fence: Fence, demand: Demand) -> FenceCheck:
-    return FenceCheck(fence, demand, problem.site.road.start - fence.end)
-
-
 def nearest(problem: DesignProblem, asked: list[Demand]) -> FenceCheck:
     """Return the check of the fence that comes nearest to the rule where none fits it.
 
@@ -260,7 +258,9 @@ def nearest(problem: DesignProblem, asked: list[Demand]) -> FenceCheck:
     limit = problem.zone.max_height
     made = {name: row for name, row in FENCE_CLASSES.items() if row.lowest <= limit}
     checks = [
-        _check(problem, Fence(demand.x, min(row.height, limit), energy_class=name), demand)
+        FenceCheck.of(
+            problem.site, Fence(demand.x, min(row.height, limit), energy_class=name), demand
+        )
         for demand in asked
         for name, row in (made or FENCE_CLASSES).items()
     ]

@@ -34,8 +34,8 @@ BINS = 30
 ENERGIES = 1e4
 """Greatest energy over the least that is told apart in a histogram."""
 
-WHOLE = "#222222"
-"""Colour of all events together."""
+WHOLE, NORMAL = "#222222", "#b5651d"
+"""Colours of all events together, and of heights normal to the slope."""
 
 SLOPE = ("energy", "velocity", "height", RATE)
 """Quantities of the picture along the slope."""
@@ -66,7 +66,8 @@ def along_slope(path: str | os.PathLike[str], passing: Passing, rows: Rows) -> N
             if quantity == RATE:
                 _rates(axes, passing, own)
             else:
-                _quantiles(axes, passing, own)
+                other = "height_normal" if quantity == "height" else ""
+                _quantiles(axes, passing, own, [r for r in rows if r["quantity"] == other])
             axes.axvspan(
                 passing.site.road.start, passing.site.road.end, color=ROAD, alpha=0.2, lw=0
             )
@@ -76,8 +77,12 @@ def along_slope(path: str | os.PathLike[str], passing: Passing, rows: Rows) -> N
         save(figure, path)
 
 
-def _quantiles(axes: Axes, passing: Passing, rows: Rows) -> None:
-    """Draw the quantiles over all events, with the interval of the 95 % quantile."""
+def _quantiles(axes: Axes, passing: Passing, rows: Rows, normal: Rows) -> None:
+    """Draw the quantiles over all events, with the interval of the 95 % quantile.
+
+    `normal` are the rows of heights normal to the slope, of which the 95 % quantile is drawn; it is
+    empty for other quantities.
+    """
     own = [row for row in rows if row["event"] == passing.groups[-1]]
     x = [row["x_m"] for row in own]
     for name, style in LINES.items():
@@ -85,6 +90,9 @@ def _quantiles(axes: Axes, passing: Passing, rows: Rows) -> None:
         draw_quantile(axes, x, value, high, color=WHOLE, linestyle=style)
     band = [[row[f"q95_{end}"] for row in own] for end in ("low", "high")]
     axes.fill_between(x, band[0], band[1], color=WHOLE, alpha=0.18, lw=0)
+    if normal:
+        lies = [row for row in normal if row["event"] == passing.groups[-1]]
+        axes.plot(x, [row["q95"] for row in lies], color=NORMAL, linewidth=1.2)
     name = own[0]["quantity"]
     axes.set_title(f"{QUANTITIES[name].words}, {passing.groups[-1]} [{own[0]['unit']}]", loc="left",
                    fontsize=10)  # fmt: skip
@@ -126,6 +134,7 @@ def _legend(figure: Figure, passing: Passing) -> None:
     ]
     lines += [
         Patch(color=WHOLE, alpha=0.18, lw=0, label="95 % interval"),
+        Line2D([], [], color=NORMAL, linewidth=1.2, label="95 %, normal to the slope"),
         Line2D([], [], color=WHOLE, linewidth=0.7, alpha=0.6, label="too few blocks for one"),
         Patch(color=ROAD, alpha=0.2, lw=0, label="road"),
     ]

@@ -56,10 +56,13 @@ QUANTITIES = {
     "energy_rotation": Quantity("rotational energy", "kJ", lambda p: p["rotation"] / 1e3),
     "velocity": Quantity("velocity", "m/s", lambda p: np.hypot(p["vx"], p["vy"])),
     "height": Quantity("bounce height of the centre", "m", lambda p: p["height"]),
+    "height_normal": Quantity("bounce height normal to the slope", "m", lambda p: p["normal"]),
     "height_top": Quantity("height of the top", "m", lambda p: p["height"] + p["radius"]),
 }
 """Quantities of the tables. The bounce height is that of the block's centre above the ground,
-measured vertically, as is usual; the top is higher by the radius of the circumscribed circle."""
+measured vertically; normal to the slope, it is this height times the cosine of the inclination of
+the ground over the width of the block. The top is higher than the centre by the radius of the
+circumscribed circle."""
 
 
 class Passing(NamedTuple):
@@ -235,6 +238,7 @@ def raw(passing: Passing, places: Sequence[int]) -> Rows:
         "velocity_y_m_s": table["vy"],
         "angular_velocity_rad_s": table["omega"],
         "height_m": table["height"],
+        "height_normal_m": table["normal"],
         "height_top_m": table["height"] + table["radius"],
         "energy_translation_kJ": table["translation"] / 1e3,
         "energy_rotation_kJ": table["rotation"] / 1e3,
@@ -260,8 +264,8 @@ def raw_fields(site: Site) -> list[str]:
 
 RAW = (
     "x_m", "seed", "event", "block", "time_s", "velocity_x_m_s", "velocity_y_m_s",
-    "angular_velocity_rad_s", "height_m", "height_top_m", "energy_translation_kJ",
-    "energy_rotation_kJ", "mass_kg", "width_m",
+    "angular_velocity_rad_s", "height_m", "height_normal_m", "height_top_m",
+    "energy_translation_kJ", "energy_rotation_kJ", "mass_kg", "width_m",
 )  # fmt: skip
 """Columns of the table of passages, which may have no rows."""
 
@@ -433,7 +437,7 @@ def _cell(value: Any) -> Any:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
-SHOWN = ("energy", "velocity", "height")
+SHOWN = ("energy", "velocity", "height", "height_normal")
 """Quantities that are printed."""
 
 
@@ -447,7 +451,7 @@ def tables(rows: Rows) -> Iterator[tuple[str, Table]]:
         out = empty_table(("", "median", "95 % (interval)", "99 % (interval)"))
         for row in (row for row in shown if row["x_m"] == often["x_m"]):
             if row["quantity"] in SHOWN:
-                words = f"{row['quantity']} [{row['unit']}]"
+                words = f"{row['quantity'].replace('_', ', ')} [{row['unit']}]"
                 out.add_row(words, *(_words(row, name) for name in ("q50", "q95", "q99")))
         survey = ""
         if "chainage_m" in often:

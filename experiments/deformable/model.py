@@ -61,7 +61,7 @@ class Deformable:
         """Take `n` steps."""
         loop, a = self._sim.loop, self._sim.loop.arrays
         fits, swapped = advance(
-            World(a.bodies, a.outlines, a.ground, a.interfaces, a.links, a.shaking),
+            World(a.bodies, a.outlines, a.ground, a.interfaces, a.links, a.shaking, a.stems),
             loop.now,
             loop.before,
             a.work,

@@ -91,7 +91,9 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     the deflection. Its top sinks in proportion, to half the height at full elongation. The fence
     then fails, and the blocks continue with the remaining energy. Impacts on it are plastic and
     frictionless regardless of its surface, and the mass of its net moves with the rock. Uphill
-    forces do not move it.
+    forces do not move it. The net stands vertical, and its height is vertical. A kit intercepts as
+    much as a net whose height is the nominal height of the kit, which is normal to the slope,
+    divided by the cosine of the slope.
 
     Raises
     ------

@@ -42,6 +42,13 @@ class GroundArrays(NamedTuple):
     bin_width: float
 
 
+class Stems(NamedTuple):
+    """Stems of a forest that each block strikes; no rows without a forest."""
+
+    stem: NDArray[np.void]  # (N, K) of STEM in order of chainage, padded with x = inf
+    next: Ints  # (N,) first stem that the block has not passed
+
+
 class World(NamedTuple):
     """The physical contents of a scene."""
 
@@ -51,6 +58,7 @@ class World(NamedTuple):
     interfaces: Interfaces
     links: Links
     shaking: Shaking
+    stems: Stems
 
 
 class Totals(NamedTuple):

@@ -123,7 +123,7 @@ class Loop:
         while self.counters[STEPS] < target:
             a, before = self.arrays, time.thread_time()
             reason, block, swapped = advance_directly.call(
-                World(a.bodies, a.outlines, a.ground, a.interfaces, a.links, a.shaking),
+                World(a.bodies, a.outlines, a.ground, a.interfaces, a.links, a.shaking, a.stems),
                 self.now,
                 self.before,
                 a.work,

@@ -20,6 +20,7 @@ from rigdda.dynamics.arrays import (
     Outlines,
     Rows,
     Scratch,
+    Stems,
     Work,
 )
 from rigdda.dynamics.constants import (
@@ -59,6 +60,7 @@ from rigdda.dynamics.records import (
 )
 from rigdda.dynamics.rows import COLUMNS, FACTS, SLOT_COLUMNS
 from rigdda.dynamics.run import EVENT
+from rigdda.dynamics.stems import pack_stems
 from rigdda.errors import BadInput
 from rigdda.geometry import convex_parts, moments, polygon_properties, turns
 from rigdda.kernel import Direct, short_kernel
@@ -643,6 +645,7 @@ class Arrays(NamedTuple):
     interfaces: Interfaces
     links: Links
     shaking: Shaking
+    stems: Stems
     now: Contacts
     before: Contacts
     work: Work
@@ -682,6 +685,7 @@ def pack(
         interfaces,
         pack_links(scene, bodies),
         pack_shaking(scene),
+        pack_stems(scene),
         empty_contacts(room),
         empty_contacts(room),
         empty_work(len(bodies), blocks, room),

@@ -61,8 +61,9 @@ class Energy(NamedTuple):
     `elastic` is the energy stored in bolts and plain contacts. `friction`, `damping` and `impact`
     are the work of shear forces, of damping, and of the normal forces of contacts less the stored
     energy; they are negative where they dissipate energy. The kinetic energy of a block that leaves
-    the site counts as lost in `impact`. `external` is the work of loads and of the ground motion.
-    The change of kinetic + potential + elastic equals the sum of these four.
+    the site counts as lost in `impact`, and so does the energy that stems of a forest take.
+    `external` is the work of loads and of the ground motion. The change of kinetic + potential +
+    elastic equals the sum of these four.
     """
 
     kinetic: float

@@ -143,6 +143,13 @@ SEGMENT = _record(
 )
 """One segment of the terrain."""
 
+STEM = _record(
+    x=float,  # chainage at which the centroid of the block strikes it [m]
+    energy=float,  # that it takes at most [J]
+    top=float,  # elevation up to which it takes energy [m]
+)
+"""A stem of a forest that a block strikes."""
+
 STATION = _record(
     x=float,  # chainage [m]
     ground=float,  # elevation of the highest ground there [m]

@@ -21,6 +21,7 @@ from rigdda.dynamics.frames import no_frames
 from rigdda.dynamics.loop import Loop
 from rigdda.dynamics.packing import fences, pack, write_bodies
 from rigdda.dynamics.records import TARGET, Bodies, Interfaces
+from rigdda.dynamics.stems import write_stems
 from rigdda.dynamics.template import together
 from rigdda.errors import Diverged
 from rigdda.geometry import is_sound
@@ -30,6 +31,8 @@ from rigdda.model.interfaces import Meetings
 from rigdda.model.overlap import surely_on_ground
 from rigdda.model.scene import Scene
 from rigdda.model.settings import EARTH, Settings
+
+Stemmed = tuple[NDArray[np.float64], ...]
 
 MOST_CORNERS = 12
 """Maximum number of corners of such a block; the blocks of a release band have no more."""
@@ -228,6 +231,7 @@ class SingleBlock:
         leave: float,
     ):
         assert len(scene.blocks) == 1 and scene.smooth_ground is not None
+        self._scene = scene
         self._surfaces = {name: i for i, name in enumerate(scene.surfaces)}
         packed = pack(scene, settings, stations, watch, leave)
         packed = packed._replace(outlines=with_room(packed.outlines))
@@ -254,12 +258,17 @@ class SingleBlock:
         self._fences = list(fences(scene))
         self._start = packed.bodies["x"][1:].copy()
 
+    def has_room(self, stems: Stemmed) -> bool:
+        """Return whether the arrays have room for the stems that a block strikes."""
+        return all(len(table) <= self._arrays.stems.stem.shape[1] for table in stems)
+
     def run(
         self,
         block: Block,
         meetings: Meetings,
         forces: Sequence[float],
         limits: Sequence[float],
+        stems: Stemmed,
         steps: int,
     ) -> Descent | None:
         """Simulate the descent of a block.
@@ -274,6 +283,8 @@ class SingleBlock:
             Braking force of each fence, in the order of the bodies [N/m].
         limits : sequence of float
             Thrust at which each barrier is pushed away, inf: never [N/m].
+        stems : tuple of (k, 3) array
+            Stems that the block strikes, see `Scene.stems`, for which `has_room`.
         steps : int
             Maximum number of steps.
 
@@ -289,6 +300,7 @@ class SingleBlock:
         if len(limits):
             self._target["limit"] = limits
             self._brake[self._fences] = forces
+        write_stems(stems, self._scene, a.stems)
         corners = self._corners[: len(block.vertices)]
         corners[:] = block.vertices
         self._traits[0] = (block.density, *block.velocity, self._surfaces[block.surface], AWAKE)

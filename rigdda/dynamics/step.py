@@ -35,6 +35,7 @@ from rigdda.dynamics.records import (
 )
 from rigdda.dynamics.shaking import set_field
 from rigdda.dynamics.sleep import watch_quiet
+from rigdda.dynamics.stems import meet_stems
 from rigdda.kernel import entry_kernel, kernel, stage, variable
 
 
@@ -113,7 +114,7 @@ def advance(
         Whether `now` and `before` have exchanged roles.
     """
     swapped, reason, bad, p = False, DONE, -1, parameters[0]
-    bodies, outlines, ground, _, links, shaking = world
+    bodies, outlines, ground, _, links, shaking, stems = world
     counters, ledger = totals.counters, totals.ledger
     may_fly = len(links) == 0 and len(shaking) == 0 and not p.static and p.post_correction
     flyer, flown, flight = (
@@ -152,6 +153,7 @@ def advance(
             update_fences(bodies, outlines, now, count, monitors, counters, ledger, time, p)
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
+        meet_stems(bodies, stems, ledger)
         press_asleep(bodies, now, count, monitors, p.dt)
         events = counters[EVENTS]
         reason = end_step(bodies, now, count, work, monitors, counters, p)

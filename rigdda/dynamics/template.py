@@ -21,6 +21,7 @@ from rigdda.dynamics.packing import (
     start_targets,
     write_polygons,
 )
+from rigdda.dynamics.stems import room_for, write_stems
 from rigdda.geometry import is_convex
 from rigdda.model.scene import Scene, Terrain
 from rigdda.model.settings import Settings
@@ -74,6 +75,7 @@ class Template:
         mine, blocks = self.scene.blocks, scene.blocks
         return (
             _alike(scene.ground, self.scene.ground)
+            and room_for(scene) <= self._arrays.stems.stem.shape[1]
             and len(blocks) == len(mine)
             and self._most_corners(scene) == self._corners
             and not any(b.fixed for b in mine)
@@ -115,6 +117,7 @@ class Template:
             set_brakes(scene, arrays.bodies)
         if other_surfaces:
             arrays.interfaces[...] = pack_interfaces(scene, self._names)
+        write_stems(scene.stems, scene, arrays.stems)
         start_rock(self._rock, bodies, self._stations)
         for name, value in rock_numbers(scene, self._settings, bodies).items():
             self._parameters[name] = value

@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rigdda import check
 from rigdda.barriers import (
@@ -178,6 +178,34 @@ def check_clear(scene: Scene, ground: Terrain) -> None:
             raise BadInput(f"barriers[{j}].x", scene.barriers[j].x, mend)
 
 
+def checked_stems(
+    stems: Sequence[ArrayLike], blocks: int, terrain: Terrain | None
+) -> tuple[NDArray[np.float64], ...]:
+    """Return the tables of stems of the blocks, each in order of chainage.
+
+    Raises
+    ------
+    BadInput
+        If there is not one (k, 3) table for each block, or a stem is not on the terrain or takes a
+        negative energy.
+    """
+    if len(stems) == 0:
+        return ()
+    if len(stems) != blocks:
+        raise BadInput("stems", f"{len(stems)} tables", f"give one for each of {blocks} blocks")
+    if terrain is None:
+        raise BadInput("stems", "no terrain", "give the scene a terrain on which they stand")
+    low, high = terrain.points[:, 0].min(), terrain.points[:, 0].max()
+    found = []
+    for i, rows in enumerate(stems):
+        table = np.array(rows, dtype=np.float64).reshape(-1, 3)
+        for row in table[~((table >= (low, 0.0, 0.0)) & (table <= (high, np.inf, np.inf))).all(1)]:
+            mend = f"give a chainage from {low:g} to {high:g} m, and an energy and a height >= 0"
+            raise BadInput(f"stems[{i}]", row.tolist(), mend)
+        found.append(table[np.argsort(table[:, 0], kind="stable")])
+    return tuple(found)
+
+
 def check_order(scene: Scene) -> None:
     """Check that every barrier that is a body starts downhill of the end of the one before.
 
@@ -234,6 +262,11 @@ class Scene:
         zero. The motion of blocks is computed relative to the ground.
     roughness : Roughness, optional
         Pits in the ground, except under barriers.
+    stems : sequence of (k, 3) array_like, optional
+        Stems of a forest that each block strikes on its way downhill, one table for each block:
+        chainage [m], energy that the stem takes at most [J/m], and height above the ground up to
+        which it does [m]. A block strikes a stem when its centroid first passes the chainage. The
+        stem slows its translation and its rotation by the same factor. None by default.
 
     Raises
     ------
@@ -258,6 +291,7 @@ class Scene:
     damping_when: str = "always"
     base_motion: NDArray[np.float64] | None = None
     roughness: Roughness | None = None
+    stems: tuple[NDArray[np.float64], ...] = ()
     ground: Terrain | None = field(init=False, repr=False)
     _smooth: Terrain | None = field(init=False, repr=False)
     _moved: Mapping[Barrier, NDArray[np.float64]] = field(init=False, repr=False)
@@ -279,6 +313,7 @@ class Scene:
         if self.base_motion is not None:
             object.__setattr__(self, "base_motion", history(self.base_motion))
         check_names(self)
+        object.__setattr__(self, "stems", checked_stems(self.stems, len(self.blocks), self.terrain))
         object.__setattr__(self, "ground", self.terrain)
         object.__setattr__(self, "_moved", {})
         object.__setattr__(self, "_outlines", {})
@@ -296,8 +331,9 @@ class Scene:
         interfaces: Mapping[tuple[str, str], Surface],
         barriers: Sequence[Built],
         roughness: Roughness | None = None,
+        stems: tuple[NDArray[np.float64], ...] = (),
     ) -> Scene:
-        """Return the scene with other blocks, surface properties and pits in the ground.
+        """Return the scene with other blocks, surface properties, pits in the ground and stems.
 
         The ground and the barriers are not built and checked again. `surfaces` must have the same
         names, and `barriers` may differ from those of the scene only in their resistance.
@@ -319,6 +355,7 @@ class Scene:
             "surfaces": surfaces,
             "interfaces": interfaces,
             "roughness": roughness,
+            "stems": stems,
         }
         for name, value in changed.items():
             object.__setattr__(other, name, value)
@@ -482,6 +519,7 @@ def scene_to_json(scene: Scene) -> bytes:
             "damping": scene.damping,
             "damping_when": scene.damping_when,
             "roughness": scene.roughness,
+            "stems": [table.tolist() for table in scene.stems],
         }
     )
 

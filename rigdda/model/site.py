@@ -13,6 +13,7 @@ from typing import TypeVar
 import msgspec
 import numpy as np
 import tomli_w
+from numpy.typing import NDArray
 
 from rigdda import check, display, fields
 from rigdda.barriers import (
@@ -29,7 +30,7 @@ from rigdda.barriers import (
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.files import atomic, is_file, read
 from rigdda.geometry import polygon_properties
-from rigdda.model import existing, loose_blocks, site_names
+from rigdda.model import existing, forest, loose_blocks, site_names
 from rigdda.model.block import Block
 from rigdda.model.grounds import GROUNDS, OTHER, USUAL
 from rigdda.model.outcome import Outcome
@@ -52,8 +53,8 @@ ROUNDING = 1e-9
 """Tolerance for the overlap of barriers and loose rock [m]; encoded layouts lose their last
 digits."""
 
-STRENGTHS, PITS = 1, 2
-"""Last numbers of the seeds for the random properties of the ground."""
+STRENGTHS, PITS, STEMS = 1, 2, 3
+"""Last numbers of the seeds for the random properties of the ground and of the forest."""
 
 FARTHEST = 2.5
 """Standard deviations at which random normal numbers of the ground are truncated."""
@@ -241,7 +242,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             areas, drawn = loose_blocks.draw(rng, rock, what, loose_blocks.line(self.slope.points))
             blocks = tuple(drawn)
         shift = normal * self.scatter.friction_deg
-        return Drawn(name, blocks, what.width_of(areas), shift, *_ground(self, seed, index))
+        width, ground = what.width_of(areas), _ground(self, seed, index)
+        return Drawn(name, blocks, width, shift, *ground, _stems(self, blocks, seed, index))
 
     def built(self, layout: Sequence[Barrier], width: float) -> tuple[Built, ...]:
         """Return the barriers of a layout in a scene, adapted to the width of an event [m].
@@ -334,6 +336,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             damping=self.motion.damping,
             damping_when=self.motion.damping_when,
             roughness=drawn.roughness,
+            stems=drawn.stems,
         )
 
     def realise(
@@ -625,6 +628,22 @@ def _ground(
     event = site.events[index]
     spacing = event.block_size(site.source(event.source))
     return strengths, Roughness(spacing, amplitude, (seed, index, PITS))
+
+
+def _stems(
+    site: Site, blocks: Sequence[Block], seed: int, index: int
+) -> tuple[NDArray[np.float64], ...]:
+    """Return the stems that each block strikes, `Drawn.stems`.
+
+    They have their own random stream, so that blocks and ground do not depend on the forest.
+    """
+    if not site.forest:
+        return ()
+    rng, found = stream((seed, index, STEMS)), []
+    for block in blocks:
+        area, centre, _ = polygon_properties(block.vertices)
+        found.append(forest.stems(rng, site.forest, float(centre[0]), math.sqrt(area)))
+    return tuple(found)
 
 
 def _cut_off(normal: float) -> float:

@@ -18,6 +18,7 @@ from rigdda.fields import about, documented
 from rigdda.model.barrier_zone import BarrierZone
 from rigdda.model.block import Block
 from rigdda.model.existing import Existing
+from rigdda.model.forest import Forest
 from rigdda.model.partial_factors import PartialFactors
 from rigdda.model.prices import Consequences, Prices
 from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT, check_damping
@@ -450,6 +451,8 @@ class Drawn(NamedTuple):
     the site in order; empty if no surface varies."""
     roughness: Roughness | None = None
     """Pits in the ground; None if it is smooth."""
+    stems: tuple[NDArray[np.float64], ...] = ()
+    """Stems that each block strikes, see `Scene.stems`; empty if the site has no forest."""
 
 
 @documented
@@ -683,6 +686,10 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     ] = ()
     prices: Annotated[Prices, about("Prices of barriers.")] = msgspec.field(default_factory=Prices)
     consequences: Annotated[Consequences, about("Costs of rock on the road.")] = Consequences()
+    forest: Annotated[
+        tuple[Forest, ...],
+        about("Forest on the slope. Its stems take energy from the blocks that strike them."),
+    ] = ()
     existing: Annotated[
         tuple[Existing, ...],
         about("Barriers that stand already. They are part of every layout."),

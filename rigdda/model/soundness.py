@@ -50,6 +50,7 @@ def check_site(site: SiteTables) -> None:
     _check_events(site)
     for source in site.sources:
         _check_source(site, source)
+    _check_forest(site)
     _check_zone(site)
     _check_meshes(site)
     motion = site.motion
@@ -234,6 +235,17 @@ def _check_piece(
             f"the ground by {sunk:g} m2"
         )
         raise BadInput(f"{where}[{corner}]", piece[corner], mend)
+
+
+def _check_forest(site: SiteTables) -> None:
+    check_names("forest", (forest.name for forest in site.forest))
+    low, high = site.slope.points[0][0], site.slope.points[-1][0]
+    for i, forest in enumerate(site.forest):
+        for name in ("start", "end"):
+            at = getattr(forest, name)
+            if not low <= at <= high:
+                mend = f"keep it on the slope: at least {low:g} and at most {high:g}"
+                raise BadInput(f"forest[{i}].{name}", at, mend)
 
 
 def _check_zone(site: SiteTables) -> None:

@@ -110,6 +110,30 @@ class Terrain:
             for (ax, ay), (bx, by) in ends
         )
 
+    def inclination(self, x: ArrayLike, base: ArrayLike) -> NDArray[np.float64]:
+        """Return the inclination of the ground around chainages, positive where it falls [rad].
+
+        It is that of the line between the highest ground half a base uphill and half a base
+        downhill; beyond its ends, the terrain counts as level.
+
+        Parameters
+        ----------
+        x, base : array_like
+            Chainages and lengths of the bases, of the same shape or one of them a number [m].
+        """
+        middle, half = np.broadcast_arrays(np.asarray(x, float), 0.5 * np.asarray(base, float))
+        low, high = self.points[:, 0].min(), self.points[:, 0].max()
+        ends = np.clip(np.stack([middle - half, middle + half]), low, high)
+        rise = np.diff(self._heights(ends), axis=0)[0]
+        return np.arctan2(-rise, 2.0 * half)
+
+    def _heights(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the elevations of the highest ground at chainages on the terrain [m]."""
+        chain, level = self.points.T
+        if (np.diff(chain) > 0.0).all():
+            return np.interp(x, chain, level)
+        return np.array([self.height(at) for at in x.ravel().tolist()]).reshape(x.shape)
+
 
 STEEPEST = 5.0
 """Slope, rise over run, above which the ground has no pits [-]. Pits are vertical, so that they

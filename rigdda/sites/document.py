@@ -15,6 +15,7 @@ from rigdda.barriers import KINDS, MeshOption
 from rigdda.fields import Described, described
 from rigdda.files import atomic
 from rigdda.model.existing import Existing
+from rigdda.model.forest import Forest
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.joints import JointSet
 from rigdda.model.partial_factors import PartialFactors
@@ -47,6 +48,7 @@ TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("`[origin]`", Origin),
     ("`[road]`", Road),
     ("`[barrier_zone]`", BarrierZone),
+    ("`[[forest]]`", Forest),
     ("`[[existing]]`", Existing),
     ("`[surfaces.NAME]`", Surface),
     ("`[[interfaces]]`", Interface),

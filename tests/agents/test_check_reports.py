@@ -83,7 +83,7 @@ def test_the_sheets_hold_every_figure_to_the_digit(problem: DesignProblem) -> No
     fence = Fence(20.0, 2.0, energy_class=250)
     demand = demand_at(answer.envelope, problem.site.rule, 20.0)
     assert answer.check is not None and demand is not None
-    mine = FenceCheck(fence, demand, problem.site.road.start - fence.end)
+    mine = FenceCheck.of(problem.site, fence, demand)
     rows = [*checks.sheets(answer, LayoutChecks((mine,), (), ()))]
     half = len(rows) // 2
     assert {row["layout"] for row in rows[:half]} == {"rule"}

@@ -17,6 +17,7 @@ from rigdda import Event, Site
 from rigdda.agents import site_check
 from rigdda.agents.site_check import Trial, oddities
 from rigdda.model.existing import Existing
+from rigdda.model.forest import Forest
 from rigdda.model.grounds import GROUNDS
 from rigdda.model.site_tables import Motion
 from rigdda.model.surface import Interface
@@ -131,14 +132,16 @@ def test_traffic_and_existing_barriers_are_templates(tmp_path, asked):
     run("new", "slope", "--profile", "survey.csv", *asked, folder=tmp_path)
     text = (tmp_path / "slope.toml").read_text()
     site = Site.parse(text, "slope")
-    assert site.traffic is None and site.existing == ()
+    assert site.traffic is None and site.existing == site.forest == ()
     head, *templates = re.split(r"\n\n(?=# # )", text)
-    assert len(templates) == 2
+    assert len(templates) == 3
     uncommented = [re.sub(r"(?m)^# ", "", template) for template in templates]
-    (fence,) = Site.parse(f"{head}\n{uncommented[1]}", "slope").existing
+    (wood,) = Site.parse(f"{head}\n{uncommented[1]}", "slope").forest
+    assert (wood.stems, wood.dbh, wood.dbh_sd) == (400.0, 0.3, 0.1)
+    (fence,) = Site.parse(f"{head}\n{uncommented[2]}", "slope").existing
     assert (fence.kind, fence.height, fence.energy_class) == ("fence", 2.0, 250)
     whole = Site.parse("\n\n".join([head, *uncommented]), "slope")
-    assert whole.existing == (fence,)
+    assert whole.existing == (fence,) and whole.forest == (wood,)
     assert whole.traffic == Traffic(2000.0, 60.0, 100.0)
     for unit in ("[1/day]", "[km/h]", "[m]", "[kJ]", "[EUR/m]"):
         assert any(unit in template for template in templates)
@@ -567,6 +570,39 @@ def test_unusual_barriers_that_stand_look_odd(slope, one, part):
     assert any(part in line for line in oddities(replace(slope, existing=(one,))))
     usual = Existing("wall", 100.0, 3.0, thickness=1.0)
     assert oddities(replace(slope, existing=(usual,))) == []
+
+
+@pytest.mark.parametrize(
+    ("one", "part"),
+    [
+        (Forest(30.0, 90.0, stems=8000.0, dbh=0.3), "8000 stems of 0.3 m are a basal area of 565"),
+        (Forest(30.0, 90.0, stems=400.0, dbh=0.03), "400 stems of 0.03 m are a basal area of 0.28"),
+        (
+            Forest(30.0, 90.0, stems=200.0, dbh=0.3, dbh_sd=0.4),
+            "forest[0].dbh_sd = 0.4: it is more",
+        ),
+        (
+            Forest(30.0, 90.0, stems=400.0, dbh=0.3, height=25.0),
+            "forest[0].height = 25: the energy",
+        ),
+        (Forest(0.0, 4.0, stems=400.0, dbh=0.3), "forest[0].end = 4: all rock starts farther"),
+        (Forest(30.0, 115.0, stems=400.0, dbh=0.3), "forest[0]: it reaches onto the road, x = 112"),
+    ],
+)
+def test_an_unusual_forest_looks_odd(slope, one, part):
+    (line,) = oddities(replace(slope, forest=(one,)))
+    assert part in line
+    usual = Forest(30.0, 90.0, stems=400.0, dbh=0.3, dbh_sd=0.1)
+    assert oddities(replace(slope, forest=(usual,))) == []
+
+
+def test_a_forest_is_told_with_what_it_does(slope):
+    wood = Forest(30.0, 90.0, stems=400.0, dbh=0.3)
+    (line,) = [
+        line for line in site_check.facts(replace(slope, forest=(wood,))) if "forest" in line
+    ]
+    assert "forest at x = 30 to 90 m: 400 stems a hectare of 0.3 m, a basal area of 28.3 m2" in line
+    assert "a block 0.68 m wide strikes one in every 25.5 m, which takes at most 93 kJ" in line
 
 
 def test_a_closure_for_fifty_euros_looks_odd(slope):

@@ -251,7 +251,7 @@ def test_what_is_built_satisfies_the_rule_and_nothing_cheaper_does(
         for tall in {row.lowest, found.check.fence.height}:
             if tall <= row.height:
                 other = Fence(20.0, tall, energy_class=energy_class)
-                check = FenceCheck(other, found.check.demand, found.check.clearance)
+                check = FenceCheck.of(SITE, other, found.check.demand)
                 assert not check.fits or SITE.capital((other,)) >= price - 1e-9
     assert more.name != "rule" or SITE.capital(more.layout) >= price - 1e-9
 

@@ -45,6 +45,7 @@ def values(passage: dict[str, str]) -> dict[str, float]:
         "energy_rotation": rotation,
         "velocity": float(np.hypot(number["velocity_x_m_s"], number["velocity_y_m_s"])),
         "height": number["height_m"],
+        "height_normal": number["height_normal_m"],
         "height_top": number["height_top_m"],
     }
 

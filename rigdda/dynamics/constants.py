@@ -30,7 +30,7 @@ RETARDATION_TIME = 5e-3
 because the contact force depends on the velocity at the end of the step. Without retardation, an
 arch near its limit of stability vibrates in steps of 0.1 ms until it collapses."""
 
-SETTLED = 0.02
+SETTLED = 0.05
 """Relative change per iteration at which an iteration may stop [-]. In open-close iteration this is
 the change of a friction force over its limit; in relaxation, the change of a normal velocity over
 the speed of the island, so that slow islands come to rest. Without the first criterion, a block

@@ -93,7 +93,7 @@ class Settings:
     dt: float = USUAL_DT
     penetration: float | None = None
     tolerance: float = 1e-7
-    sweep_tolerance: float = 0.005
+    sweep_tolerance: float = 0.01
     open_close_iterations: int = 12
     mode: str = "dynamic"
     solver: str = "pcg"

@@ -334,6 +334,7 @@ def sweep_until(
 
     `square` is inf, or -1 to sweep without extrapolation, see `extrapolate`.
     """
+    start_extrapolation(rows, active)
     for s in range(n + 1):
         rows.moved_in[s] = -1
     for tries in range(MOST_SWEEPS):
@@ -341,11 +342,7 @@ def sweep_until(
         worst = sweep(rows, n, visits, tries, number, reach, tolerance)
         if worst <= tolerance:
             return tries + 1
-        if square < 0.0 or tries + 1 == MOST_SWEEPS:
-            continue
-        if tries + 1 == SET_OF_SWEEPS // 2:  # most substeps end before that
-            start_extrapolation(rows, active)
-        elif (tries + 1 + SET_OF_SWEEPS // 2) % SET_OF_SWEEPS == 0:
+        if (tries + 1) % SET_OF_SWEEPS == 0 and square >= 0.0 and tries + 1 < MOST_SWEEPS:
             square = extrapolate(rows, active, square)
             for s in range(n + 1):
                 rows.moved_in[s] = tries

@@ -59,7 +59,7 @@ class Settings:
     sweep_tolerance : float
         Convergence tolerance for islands of several moving blocks, which take a step in eight
         substeps. In each substep the contacts are swept until no velocity changes by more than this
-        value times the number of blocks minus one [m/s], nor by more than 2 % of the greatest
+        value times the number of blocks minus one [m/s], nor by more than 5 % of the greatest
         speed, or for at most 100 sweeps.
     open_close_iterations : int
         Maximum number of open-close iterations per step; nearly all steps need 1 to 3. If they have
@@ -93,7 +93,7 @@ class Settings:
     dt: float = USUAL_DT
     penetration: float | None = None
     tolerance: float = 1e-7
-    sweep_tolerance: float = 0.01
+    sweep_tolerance: float = 0.005
     open_close_iterations: int = 12
     mode: str = "dynamic"
     solver: str = "pcg"

@@ -33,9 +33,9 @@ arch near its limit of stability vibrates in steps of 0.1 ms until it collapses.
 SETTLED = 0.05
 """Relative change per iteration at which an iteration may stop [-]. In open-close iteration this is
 the change of a friction force over its limit; in relaxation, the change of a normal velocity over
-the speed of the island, so that slow islands come to rest. Without the first criterion, a block with
-the paper's contacts on a 35 deg slope with 34 deg of friction slides six times too far in steps of
-10 ms. With 0.02, masses in motion take a quarter more time and penetrate as much."""
+the speed of the island, so that slow islands come to rest. Without the first criterion, a block
+with the paper's contacts on a 35 deg slope with 34 deg of friction slides six times too far in
+steps of 10 ms. With 0.02, masses in motion take a quarter more time and penetrate as much."""
 
 SUBSTEPS = 8
 """Number of substeps in the relaxation of an island of several bodies [-]. An impact propagates

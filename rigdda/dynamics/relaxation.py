@@ -19,24 +19,26 @@ within the substep. The distance that a wheel of sixteen sides rolls is too larg
 The impulses are found by projected Gauss-Seidel sweeps, which decide the state of each contact as
 they visit it. The normal impulse cannot pull. It limits the closing velocity of an open contact to
 that which just closes its gap within the substep, and stops the approach of a closed contact. The
-two contacts of a face are solved together (`sweeps.press_face`). The shear impulse stops slip within the
-friction limit. Many short substeps with few sweeps resolve the path of an impact better than one
-step with many sweeps (Macklin et al. 2019, Small steps in physics simulation). After each
-`SET_OF_SWEEPS` sweeps, the impulses are extrapolated (`sweeps.extrapolate`), without which heavy bodies on
-light ones would rebound from plastic impacts.
+two contacts of a face are solved together (`sweeps.press_face`). The shear impulse stops slip
+within the friction limit. Many short substeps with few sweeps resolve the path of an impact better
+than one step with many sweeps (Macklin et al. 2019, Small steps in physics simulation). After each
+`SET_OF_SWEEPS` sweeps, the impulses are extrapolated (`sweeps.extrapolate`), without which heavy
+bodies on light ones would rebound from plastic impacts.
 
 Rolling resistance is a moment of at most c N R against the relative rotation of the bodies of a
 contact, where R is the radius of gyration of `law.rolling_radius`. As an impulse along e_r = (0, 0,
 R), it acts like friction. Within the sweeps, its limit follows a decreasing normal impulse but not
 an increasing one, as this could diverge. Therefore the substep is first settled with the limits of
-the last one, and then with the limits of the normal impulses that it found (`sweeps.limit_rolling`).
+the last one, and then with the limits of the normal impulses that it found
+(`sweeps.limit_rolling`).
 
 A contact that closes faster than a body that has fallen by the target penetration, and faster than
 the tolerance of the sweeps, undergoes an impact. The impact is plastic during its substep. At the
 end of the substep, contacts with an impact open with the velocities given by their restitution, see
 `rebound`; the sum of both impulses of a contact obeys Coulomb friction. If the impact would gain
-energy, restitution is reduced. (Impacts slower than the tolerance would end the support of a pile by contacts that sweeps
-have not yet resolved: in a hopper of 1,000 blocks, penetration was ten times as great.)
+energy, restitution is reduced. (Impacts slower than the tolerance would end the support of a pile
+by contacts that sweeps have not yet resolved: in a hopper of 1,000 blocks, penetration was ten
+times as great.)
 
 Contacts penetrate slightly, because sweeps end at a tolerance and bodies rotate within a substep.
 Excess penetration is removed at the end of the step, see `position_correction`.

@@ -4,7 +4,7 @@ A spring of stiffness k along a direction (l, m), the normal or the shear direct
 e_j to the stiffness matrix, where e_i = (l, m, r x (l, m)) is the row of T_i along that direction.
 `assemble_contact` adds the springs of a contact, including the friction submatrix.
 Mass-proportional damping is added with the inertia (`inertia_stiffness`); relaxation applies it in
-`relaxation.fade`.
+`slots.fade`.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ The shear spring acts in the same way on the shear velocity, starting from the s
 last step, and is limited by Coulomb friction in a return mapping. So does a spring on R times the
 relative rate of rotation, limited by rolling resistance: its force times R is the moment. Islands
 in motion, and at first also islands at rest, are relaxed instead, with rigid contacts
-(`rigdda.dynamics.relaxation`). Restitution acts only there (`relaxation.rebound`).
+(`rigdda.dynamics.relaxation`). Restitution acts only there (`rebound.rebound`).
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ and follow the same law (`contact.law`). A pin has b = 0. A bolt has w_0 = 0, ka
 -T / kappa, so that N is minus its mean tension over the step, T + k d / 2. It acts along the mean
 of its directions before and after the step, so that d is its change of length. Both together
 conserve energy for any step length. The state of a support is decided in
-`open_close.next_state_of_link`, and in relaxation by `relaxation.aim_row` and the limits in
-`relaxation.press_row` and `relaxation.drag_row`.
+`open_close.next_state_of_link`, and in relaxation by `substep.aim_row` and the limits in
+`sweeps.press_row` and `sweeps.drag_row`.
 """
 
 from __future__ import annotations

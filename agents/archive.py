@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from rigdda import BadInput, Layout, Outcome, Site, __version__
+from rigdda import MECHANICS, BadInput, Layout, Outcome, Site, __version__
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import from_table, to_tables
 from rigdda.envs import DesignProblem, ensemble
 from rigdda.envs.ensemble import Ensemble
-from rigdda.envs.outcome_cache import mechanics, unpack
+from rigdda.envs.outcome_cache import unpack
 from rigdda.envs.problem import Targets
 from rigdda.files import atomic, is_file
 
@@ -116,7 +116,7 @@ def archive(
     known = ensemble.of(problem.site, problem.key)
     return Archive(
         version=__version__,
-        sources=mechanics(),
+        sources=MECHANICS,
         site=problem.site,
         max_barriers=problem.max_barriers,
         kinds=list(problem.kinds),

@@ -14,8 +14,7 @@ from typing import Any
 
 import msgspec
 
-from rigdda import BadInput, Site
-from rigdda.envs.outcome_cache import mechanics
+from rigdda import MECHANICS, BadInput, Site
 from rigdda.envs.replay_record import Versions
 from rigdda.files import atomic
 
@@ -71,7 +70,7 @@ class RunRecord(msgspec.Struct, kw_only=True):
             options={name: _plain(value) for name, value in options.items()},
             started=_now(),
             versions=Versions.of_today(),
-            mechanics=mechanics(),
+            mechanics=MECHANICS,
             site="" if site is None else as_toml(site),
         )
 

@@ -27,6 +27,7 @@ import rigdda.envs  # noqa: F401  registers the environments
 from experiments.made_by import KERNELS, made_by
 from experiments.script import RESULTS, put, say, write
 from rigdda import (
+    MECHANICS,
     Bolt,
     Ditch,
     Embankment,
@@ -38,7 +39,6 @@ from rigdda import (
     Site,
 )
 from rigdda.envs import DesignProblem
-from rigdda.kernel import kernels_hash
 from rigdda.model.settings import Settings
 from rigdda.releases import Batch
 from rigdda.validation.case import evaluate
@@ -173,7 +173,7 @@ def recorded(out: Path) -> dict[str, str]:
 
 def carry(out: Path) -> list[Path]:
     """Mark tables made by the recorded kernels as made by the current ones; return these tables."""
-    old, new = made_by((out / TABLE).parent).get(TABLE.name), kernels_hash()
+    old, new = made_by((out / TABLE).parent).get(TABLE.name), MECHANICS
     carried = []
     for path in sorted(out.rglob(KERNELS)):
         made = made_by(path.parent)

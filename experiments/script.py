@@ -20,9 +20,9 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from experiments.made_by import KERNELS, made_by
+from rigdda import MECHANICS
 from rigdda.envs.intervals import quantile
 from rigdda.files import atomic
-from rigdda.kernel import kernels_hash
 
 RESULTS = Path("experiments/results")
 """Folder of recorded results; those of quick runs are in its subfolder `quick`."""
@@ -121,7 +121,7 @@ def say(what: str) -> None:
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write rows as CSV and note the kernels that made them, see `experiments.made_by`."""
     put(path, rows)
-    made = made_by(path.parent) | {path.name: kernels_hash()}
+    made = made_by(path.parent) | {path.name: MECHANICS}
     put(path.parent / KERNELS, [{"table": k, "kernels": made[k]} for k in sorted(made)])
 
 

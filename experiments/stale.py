@@ -13,14 +13,14 @@ import click
 
 from experiments.made_by import KERNELS, made_by
 from experiments.script import RESULTS
+from rigdda import MECHANICS
 from rigdda.agents.exam import specification
-from rigdda.kernel import kernels_hash
 
 
 def stale(folder: Path) -> list[Path]:
     """Return the tables below a folder that were made by other or unknown kernels."""
     tables = sorted(path for path in folder.rglob("*.csv") if path.name != KERNELS)
-    return [path for path in tables if made_by(path.parent).get(path.name) != kernels_hash()]
+    return [path for path in tables if made_by(path.parent).get(path.name) != MECHANICS]
 
 
 @click.command(help=__doc__)

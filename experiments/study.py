@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from experiments.script import say, write
+from rigdda import MECHANICS
 from rigdda.files import atomic
-from rigdda.kernel import kernels_hash
 
 Row = dict[str, Any]
 
@@ -41,7 +41,7 @@ def tabulate(
     processes : int
         Number of cases measured at once; more than one only if each starts its own process.
     """
-    kept = path.with_name(f"{path.stem}-{kernels_hash()}.part.json")
+    kept = path.with_name(f"{path.stem}-{MECHANICS}.part.json")
     rows: list[Row] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else []
     by_case = {key(row, cases[0]): row for row in rows}
     todo = [case for case in cases if key(case, case) not in by_case]

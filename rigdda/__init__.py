@@ -7,4 +7,12 @@ import lazy_loader
 
 __version__ = "0.2.0"
 
+MECHANICS = "0"
+"""Version of everything that determines results: the mechanics, the releases of a site, the
+generator of sites, and the arithmetic of costs and statistics.
+
+Stored results are used only if they have this version. Change it together with any result; see
+CONTRIBUTING.md. It is part of file names.
+"""
+
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

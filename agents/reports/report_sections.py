@@ -314,7 +314,7 @@ def repeat(folders: Folders) -> Iterator[Block]:
     rows = [_run(folder, record) for folder, record in records]
     yield listed("Runs", "mechanics: hash of all sources that affect a result.", head, rows)
     versions = dict.fromkeys(record.versions for _, record in records)
-    names = ("rigdda", "kernels", "numba", "numpy", "python", "machine")
+    names = ("rigdda", "mechanics", "numba", "numpy", "python", "machine")
     yield listed("Versions", "", names, [[getattr(v, name) for name in names] for v in versions])
     rest = [_options(record) for _, record in records]
     yield listed("Options", "All options, also those that were not typed.", ("command", "options"),

@@ -50,8 +50,8 @@ class Archive(msgspec.Struct, frozen=True):
 
     Parameters
     ----------
-    version, sources : str
-        Version of the program, and hash of the sources on which outcomes depend.
+    version, mechanics : str
+        Versions of the program and of the mechanics.
     site : Site
         The site as it was simulated.
     max_barriers, kinds, targets, zone, max_cost
@@ -73,7 +73,7 @@ class Archive(msgspec.Struct, frozen=True):
     """
 
     version: str
-    sources: str
+    mechanics: str
     site: Site
     max_barriers: int
     kinds: list[str]
@@ -116,7 +116,7 @@ def archive(
     known = ensemble.of(problem.site, problem.key)
     return Archive(
         version=__version__,
-        sources=MECHANICS,
+        mechanics=MECHANICS,
         site=problem.site,
         max_barriers=problem.max_barriers,
         kinds=list(problem.kinds),

@@ -46,6 +46,7 @@ from rigdda.agents.reports import findings
 from rigdda.agents.reports.tables import EvaluationsFile
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.envelope import largest
+from rigdda.envs.outcome_cache import fingerprint
 from rigdda.envs.problem import MISSED
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
@@ -98,7 +99,8 @@ def simulate(
     run, _ = rigdda.release(site, layout, seeds[0], event)
     names = site.event_names if event is None else (event,)
     chunk = max(LEAST, CHUNK // max(largest(site, name) for name in names))
-    asked = [rigdda.__version__, MECHANICS, fingerprint(site).hex(), list(layout), event, list(stations)]
+    own = fingerprint(site).hex()
+    asked = [rigdda.__version__, MECHANICS, own, list(layout), event, list(stations)]
     key = hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:16]
     outcomes: list[Outcome] = []
     found: list[Passages] = []

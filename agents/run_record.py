@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from rigdda import MECHANICS, BadInput, Site
+from rigdda import BadInput, Site
 from rigdda.envs.replay_record import Versions
 from rigdda.files import atomic
 
@@ -38,8 +38,6 @@ class RunRecord(msgspec.Struct, kw_only=True):
         interruption.
     versions : Versions
         Versions of the programs.
-    mechanics : str
-        Hash of all sources that affect a result.
     site : str
         The site as it was used, as TOML with all defaults; empty if the command has no site.
     files : list of str
@@ -54,7 +52,6 @@ class RunRecord(msgspec.Struct, kw_only=True):
     started: str
     ended: str = ""
     versions: Versions
-    mechanics: str
     site: str = ""
     files: list[str] = []
     findings: list[str] = []
@@ -70,7 +67,6 @@ class RunRecord(msgspec.Struct, kw_only=True):
             options={name: _plain(value) for name, value in options.items()},
             started=_now(),
             versions=Versions.of_today(),
-            mechanics=MECHANICS,
             site="" if site is None else as_toml(site),
         )
 

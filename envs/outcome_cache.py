@@ -35,7 +35,6 @@ from rigdda.model.settings import EARTH
 from rigdda.model.terrain import REACH
 from rigdda.releases import check_duration
 
-
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 

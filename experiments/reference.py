@@ -7,7 +7,7 @@ are verified on fresh releases, until half the 95 % interval of the best is belo
 barriers. Among layouts within that difference, the one with the fewest barriers is the best.
 
 Writes reference.csv, one row per layout, and reference.png. An interrupted run is resumed: sites
-whose rows were made by the current kernels are not computed again.
+whose rows were made by the current mechanics are not computed again.
 """
 
 from __future__ import annotations

@@ -25,8 +25,8 @@ def tabulate(
     """Measure all cases, write the table and return its rows.
 
     A row has the columns of its case followed by the measured ones. Until the table is complete,
-    rows are saved beside it under the hash of the kernels: an interrupted study is resumed if the
-    kernels are the same, and restarted otherwise.
+    rows are saved beside it under the version of the mechanics: an interrupted study is resumed if
+    it is the same, and restarted otherwise.
 
     Parameters
     ----------

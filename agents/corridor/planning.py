@@ -261,7 +261,8 @@ class Planner:
         """Search the front of every section."""
         budget = int(SEARCH * self.releases)
         asks = [(problem, budget, self._seed(s)) for s, problem in enumerate(self.problem.problems)]
-        files = [self._file("front", p.key.hex(), p.kinds, p.max_barriers, *ask) for p, *ask in asks]
+        own = [(p.key.hex(), p.kinds, p.max_barriers, *ask) for p, *ask in asks]
+        files = [self._file("front", *values) for values in own]
         found = [_read(file) for file in files]
         new = distribution.mapped(
             self._searched if distribution.current() is None else _searched,

@@ -19,7 +19,7 @@ Outcomes = tuple[NDArray[np.float64], float]
 def kept(folder: Path, name: str, what: object, compute: Callable[[], Outcomes]) -> Outcomes:
     """Return the stored result with this name, or else compute and store it.
 
-    A stored result is valid only for the same sources of the mechanics and the same `repr` of
+    A stored result is valid only for the same version of the mechanics and the same `repr` of
     `what`.
     """
     digest = hashlib.sha256(repr((MECHANICS, what)).encode()).hexdigest()[:12]

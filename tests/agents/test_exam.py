@@ -318,8 +318,8 @@ def test_an_exam_without_references_is_refused(folder: Path) -> None:
         scorer.part(asked, sites=3)
 
 
-def test_equivalent_kernels_keep_the_specification_current() -> None:
-    known = specification.load()
-    other = msgspec.structs.replace(known, mechanics="0ld", equivalent=(MECHANICS,))
-    assert other.current and not msgspec.structs.replace(other, equivalent=()).current
-    assert msgspec.structs.replace(known, equivalent=("0ther",)).key == known.key != other.key
+def test_a_specification_is_current_with_the_mechanics_of_its_references() -> None:
+    known = msgspec.structs.replace(specification.load(), mechanics=MECHANICS)
+    other = msgspec.structs.replace(known, mechanics="0ld")
+    assert known.current and not other.current
+    assert known.key != other.key

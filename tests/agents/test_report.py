@@ -280,7 +280,7 @@ def test_a_record_says_what_made_a_folder(made: Made) -> None:
     record = read(made.folder / "decision")["design"]
     assert record.arguments == [*DESIGN, "--out", "decision"]
     assert record.options["seed"] == 0 and record.options["designer"] == "race"
-    assert record.started <= record.ended and record.mechanics == MECHANICS
+    assert record.started <= record.ended and record.versions.mechanics == MECHANICS
     assert Site.parse(record.site, "record") == Site.load(made.folder / "chute.toml")
     assert {"layouts.csv", "layout.toml", "section.png", "episode.rrd"} <= set(record.files)
     assert record.findings and all(line in made.printed for line in record.findings)

@@ -70,10 +70,10 @@ def test_what_is_complete_is_computed_anew(tmp_path: Path) -> None:
     assert len(again.asked) == len(CASES)
 
 
-def test_other_kernels_begin_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_mechanics_begin_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(KeyboardInterrupt):
         tabulate(tmp_path / "t.csv", CASES, Measure(stops=3), told)
-    monkeypatch.setattr(study, "kernels_hash", lambda: "other")
+    monkeypatch.setattr(study, "MECHANICS", "other")
     anew = Measure()
     tabulate(tmp_path / "t.csv", CASES, anew, told)
     assert len(anew.asked) == len(CASES)

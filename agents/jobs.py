@@ -99,8 +99,8 @@ def simulate(
     run, _ = rigdda.release(site, layout, seeds[0], event)
     names = site.event_names if event is None else (event,)
     chunk = max(LEAST, CHUNK // max(largest(site, name) for name in names))
-    own = fingerprint(site).hex()
-    asked = [rigdda.__version__, MECHANICS, own, list(layout), event, list(stations)]
+    where = fingerprint(site).hex()
+    asked = [rigdda.__version__, MECHANICS, where, list(layout), event, list(stations)]
     key = hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:16]
     outcomes: list[Outcome] = []
     found: list[Passages] = []

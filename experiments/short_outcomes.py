@@ -99,10 +99,11 @@ def releases(
 
 
 def _of_outcome(o: Outcome) -> tuple[Any, ...]:
-    barriers = [(b.hits, b.max_energy, b.absorbed_energy, b.impact_heights, b.overtopped, b.failed,
-                 b.caught, b.displacement, b.thrust, b.left_height) for b in o.barriers]  # fmt: skip
+    barriers = [(b.hits, b.max_energy, b.absorbed_energy, b.impact_heights, b.overtopped, b.caught,
+                 b.displacement, b.thrust, b.left_height) for b in o.barriers]  # fmt: skip
     parts = o.slope_fraction, o.held_fraction, o.road_fraction, o.beyond_fraction
-    return o.released_mass, o.road_volume, o.reach, o.max_energy_on_road, o.run_out, parts, barriers
+    road = o.road_volume, o.max_energy_on_road
+    return o.released_mass, road, o.reach, o.run_out, parts, barriers
 
 
 def drawn(site: Site, event: str) -> list[float]:

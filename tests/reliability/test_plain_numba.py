@@ -115,7 +115,7 @@ site = Site.load("quick")
 print(*(outcomes_of(site, (Ditch(29.5, 1.0, 4.0),), event) for event in site.event_names))
 """
 
-PHYSICS = ("test_lone_block.py", "test_restitution.py", "test_gravity_walls.py", "test_fences.py")
+PHYSICS = ("test_lone_block.py", "test_restitution.py", "test_gravity_walls.py")
 
 
 @pytest.mark.slow

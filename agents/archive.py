@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from rigdda import BadInput, Layout, Outcome, Site, __version__
+from rigdda import MECHANICS, BadInput, Layout, Outcome, Site, __version__
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import from_table, to_tables
 from rigdda.envs import DesignProblem, ensemble
 from rigdda.envs.ensemble import Ensemble
-from rigdda.envs.outcome_cache import mechanics, unpack
+from rigdda.envs.outcome_cache import unpack
 from rigdda.envs.problem import Targets
 from rigdda.files import atomic, is_file
 
@@ -50,8 +50,8 @@ class Archive(msgspec.Struct, frozen=True):
 
     Parameters
     ----------
-    version, sources : str
-        Version of the program, and hash of the sources on which outcomes depend.
+    version, mechanics : str
+        Versions of the program and of the mechanics.
     site : Site
         The site as it was simulated.
     max_barriers, kinds, targets, zone, max_cost
@@ -73,7 +73,7 @@ class Archive(msgspec.Struct, frozen=True):
     """
 
     version: str
-    sources: str
+    mechanics: str
     site: Site
     max_barriers: int
     kinds: list[str]
@@ -116,7 +116,7 @@ def archive(
     known = ensemble.of(problem.site, problem.key)
     return Archive(
         version=__version__,
-        sources=mechanics(),
+        mechanics=MECHANICS,
         site=problem.site,
         max_barriers=problem.max_barriers,
         kinds=list(problem.kinds),

@@ -22,7 +22,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
-from rigdda import BadInput, Layout, Outcome, __version__, check, distribution, sites
+from rigdda import MECHANICS, BadInput, Layout, Outcome, __version__, check, distribution, sites
 from rigdda.agents.designers.constant import CONSTANTS, place
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds
@@ -33,7 +33,6 @@ from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem
 from rigdda.envs.observation import observe
 from rigdda.files import atomic
-from rigdda.kernel import kernels_hash
 
 Tick = Callable[[int, str], None]
 
@@ -188,7 +187,7 @@ def _files(folder: Path, name: str) -> tuple[Path, Path]:
 
 def _check_folder(recipe: Recipe, folder: Path) -> None:
     """Record what a folder contains."""
-    content = {**msgspec.to_builtins(recipe), "version": __version__, "kernels": kernels_hash()}
+    content = {**msgspec.to_builtins(recipe), "version": __version__, "mechanics": MECHANICS}
     file = folder / RECIPE
     if file.is_file():
         try:

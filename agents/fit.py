@@ -28,14 +28,14 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 import rigdda
-from rigdda import BadInput, Site, release_many
+from rigdda import MECHANICS, BadInput, Site, release_many
 from rigdda.agents.observations import DEPOSIT, LEAST, RUN_OUT, DataSet, DataSets
 from rigdda.agents.parameters import Parameter, Posterior, check_once, with_values
 from rigdda.agents.reports.stations import QUANTITIES
 from rigdda.agents.reports.tables import write_rows
 from rigdda.agents.score_surface import best_places
 from rigdda.agents.varied_sites import PARTS
-from rigdda.envs.outcome_cache import mechanics
+from rigdda.envs.outcome_cache import fingerprint
 from rigdda.files import atomic
 from rigdda.lumped_mass import lumped
 from rigdda.passages import Passages, passages
@@ -441,7 +441,8 @@ def _columns(sets: DataSets) -> list[str]:
 
 def _key(site: Site, sets: DataSets, model: Model, seeds: range) -> str:
     """Return a hash of everything that computed values depend on."""
-    asked: list[Any] = [rigdda.__version__, mechanics(), site, model, seeds.start, seeds.stop]
+    key = fingerprint(site).hex()
+    asked: list[Any] = [rigdda.__version__, MECHANICS, key, model, seeds.start, seeds.stop]
     asked += [[one.name, one.values[[0, -1]].tolist()] for one in sets.values()]
     return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:24]
 

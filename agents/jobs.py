@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 
 import rigdda
-from rigdda import Barrier, Layout, Outcome, Run, Site
+from rigdda import MECHANICS, Barrier, Layout, Outcome, Run, Site
 from rigdda.agents import archive, designers
 from rigdda.agents.barrier_checks import check_layout
 from rigdda.agents.design_study import (
@@ -46,7 +46,7 @@ from rigdda.agents.reports import findings
 from rigdda.agents.reports.tables import EvaluationsFile
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.envelope import largest
-from rigdda.envs.outcome_cache import mechanics
+from rigdda.envs.outcome_cache import fingerprint
 from rigdda.envs.problem import MISSED
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
@@ -99,7 +99,8 @@ def simulate(
     run, _ = rigdda.release(site, layout, seeds[0], event)
     names = site.event_names if event is None else (event,)
     chunk = max(LEAST, CHUNK // max(largest(site, name) for name in names))
-    asked = [rigdda.__version__, mechanics(), site, list(layout), event, list(stations)]
+    where = fingerprint(site).hex()
+    asked = [rigdda.__version__, MECHANICS, where, list(layout), event, list(stations)]
     key = hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:16]
     outcomes: list[Outcome] = []
     found: list[Passages] = []

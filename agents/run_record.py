@@ -15,7 +15,6 @@ from typing import Any
 import msgspec
 
 from rigdda import BadInput, Site
-from rigdda.envs.outcome_cache import mechanics
 from rigdda.envs.replay_record import Versions
 from rigdda.files import atomic
 
@@ -39,8 +38,6 @@ class RunRecord(msgspec.Struct, kw_only=True):
         interruption.
     versions : Versions
         Versions of the programs.
-    mechanics : str
-        Hash of all sources that affect a result.
     site : str
         The site as it was used, as TOML with all defaults; empty if the command has no site.
     files : list of str
@@ -55,7 +52,6 @@ class RunRecord(msgspec.Struct, kw_only=True):
     started: str
     ended: str = ""
     versions: Versions
-    mechanics: str
     site: str = ""
     files: list[str] = []
     findings: list[str] = []
@@ -71,7 +67,6 @@ class RunRecord(msgspec.Struct, kw_only=True):
             options={name: _plain(value) for name, value in options.items()},
             started=_now(),
             versions=Versions.of_today(),
-            mechanics=mechanics(),
             site="" if site is None else as_toml(site),
         )
 

@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rigdda
-from rigdda import BadInput, Layout, Outcome, Site, check
+from rigdda import MECHANICS, BadInput, Layout, Outcome, Site, check
 from rigdda.agents import limits
 from rigdda.agents.reports.study_report import StudiedLayout, StudyResults
 from rigdda.agents.reports.tables import HIT, OUTCOME, RUN_OUT, outcome_row, write_rows
 from rigdda.barriers import from_table
 from rigdda.envs.cost import Account, Facts, learn
-from rigdda.envs.outcome_cache import mechanics
+from rigdda.envs.outcome_cache import fingerprint
 from rigdda.fields import about, checked, parse
 from rigdda.files import is_file, read
 
@@ -221,7 +221,8 @@ def _row(study: Study, job: Job, outcome: Outcome) -> dict[str, Any]:
 def _key(study: Study, name: str, event: str, seed: int) -> str:
     """Return a hash of everything that a row depends on."""
     built = list(study.layouts[name])
-    asked = [rigdda.__version__, mechanics(), study.site, name, built, event, seed]
+    site = fingerprint(study.site).hex()
+    asked = [rigdda.__version__, MECHANICS, site, name, built, event, seed]
     return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:16]
 
 

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import BadInput, __version__, check, sites
+from rigdda import MECHANICS, BadInput, __version__, check, sites
 from rigdda.agents import designers, limits
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.policy import SLOTS, Network, decide, features
@@ -26,7 +26,6 @@ from rigdda.agents.run_record import check_terms
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import barrier_free
 from rigdda.envs.observation import observe
-from rigdda.envs.outcome_cache import mechanics
 from rigdda.envs.site_sampling import problem_of
 from rigdda.files import atomic
 
@@ -170,7 +169,7 @@ def _stages(terms: Terms, out: Path) -> list[int]:
     is undamaged and has the same terms.
     """
     file = out / "training.json"
-    asked: dict[str, Any] = asdict(terms) | {"version": __version__, "mechanics": mechanics()}
+    asked: dict[str, Any] = asdict(terms) | {"version": __version__, "mechanics": MECHANICS}
     _whole(out / "checkpoint.zip")
     stages = [asked.pop("episodes")]
     if file.is_file():

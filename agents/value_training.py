@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import BadInput, Layout, __version__, check, sites
+from rigdda import MECHANICS, BadInput, Layout, __version__, check, sites
 from rigdda.agents import limits
 from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble
 from rigdda.agents.designers.constant import constant
@@ -30,7 +30,6 @@ from rigdda.agents.run_record import check_terms
 from rigdda.agents.training import scaling
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
-from rigdda.envs.outcome_cache import mechanics
 from rigdda.files import atomic
 
 Floats = NDArray[np.float64]
@@ -146,7 +145,7 @@ def train(terms: ValueTerms, out: Path, tick: Tick) -> Network:
 
 def _agree(terms: ValueTerms, out: Path) -> None:
     """Record the terms in the folder, or check that they are those of the training in it."""
-    file, asked = out / "value.json", asdict(terms) | {"mechanics": mechanics()}
+    file, asked = out / "value.json", asdict(terms) | {"mechanics": MECHANICS}
     if file.is_file():
         try:
             found = msgspec.json.decode(file.read_bytes(), type=dict[str, Any])

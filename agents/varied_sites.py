@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rigdda
-from rigdda import Layout, Outcome, Site
+from rigdda import MECHANICS, Layout, Outcome, Site
 from rigdda.envs import outcome_cache
 from rigdda.envs.cost import account
 from rigdda.files import atomic
@@ -90,7 +90,7 @@ def _key(site: Site, layouts: Sequence[Layout], seeds: Seeds) -> str:
     built = [list(layout) for layout in layouts]
     drawn = {name: list(own) for name, own in seeds.items()}
     moves = [outcome_cache.release_key(site).hex(), site.existing]
-    asked = [rigdda.__version__, outcome_cache.mechanics(), moves, built, drawn]
+    asked = [rigdda.__version__, MECHANICS, moves, built, drawn]
     return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:24]
 
 

@@ -16,9 +16,7 @@ from collections import OrderedDict
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from functools import cache
 from itertools import pairwise
-from pathlib import Path
 from threading import Lock
 from typing import Generic, NamedTuple, TypeVar
 
@@ -33,36 +31,25 @@ from rigdda import (
     Site,
 )
 from rigdda.barriers import Built, Standing, earthworks
-from rigdda.kernel import source_hash
 from rigdda.model.settings import EARTH
 from rigdda.model.terrain import REACH
 from rigdda.releases import check_duration
-
-
-@cache
-def mechanics() -> str:
-    """Return a hash of all sources that affect an evaluation, and of the version of numba."""
-    digest = hashlib.sha256(source_hash().encode())
-    for folder in (Path(rigdda.__file__).parent, Path(__file__).parent):
-        for path in sorted(folder.rglob("*.py")):
-            if path.relative_to(folder).parts[0] not in ("agents", "envs", "validation"):
-                digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 
 
+TEXTS = ("name", "description", "family")
+"""Fields of a site that only describe it."""
+
+
 def fingerprint(site: Site) -> bytes:
-    """Return a key of a site: the hash of its JSON encoding, in which numbers are exact."""
-    return hashlib.sha256(msgspec.json.encode(site)).digest()[:16]
+    """Return a key of a site: the hash of everything but its `TEXTS`; numbers are exact."""
+    return _hashed(site, TEXTS, ())
 
 
 NO_MOTION = (
-    "name",
-    "description",
-    "family",
+    *TEXTS,
     "origin",
     "prices",
     "consequences",
@@ -84,10 +71,15 @@ def release_key(site: Site) -> bytes:
 
     Sites that differ only in prices, rates, traffic or existing barriers have the same key.
     """
-    tables = {name: getattr(site, name) for name in site.__struct_fields__ if name not in NO_MOTION}
+    return _hashed(site, NO_MOTION, NO_EVENT_MOTION)
+
+
+def _hashed(site: Site, tables: Sequence[str], event_fields: Sequence[str]) -> bytes:
+    """Return a hash of a site without some tables and without some fields of its events."""
+    kept = {name: getattr(site, name) for name in site.__struct_fields__ if name not in tables}
     events = [msgspec.structs.asdict(event) for event in site.events]
-    kept = [{k: v for k, v in event.items() if k not in NO_EVENT_MOTION} for event in events]
-    return hashlib.sha256(msgspec.json.encode(tables | {"events": kept})).digest()[:16]
+    kept["events"] = [{k: v for k, v in e.items() if k not in event_fields} for e in events]
+    return hashlib.sha256(msgspec.json.encode(kept)).digest()[:16]
 
 
 class Memory(Generic[K, V]):

@@ -13,17 +13,16 @@ import msgspec
 import numba
 import numpy as np
 
-from rigdda import BadInput, Layout, Outcome, Site, __version__
+from rigdda import MECHANICS, BadInput, Layout, Outcome, Site, __version__
 from rigdda.barriers import to_tables
 from rigdda.envs.problem import Targets
-from rigdda.kernel import kernels_hash
 
 
 class Versions(msgspec.Struct, frozen=True):
-    """Versions of the programs that computed a record, and the hash of the kernels."""
+    """Versions of the programs and of the mechanics that computed a record."""
 
     rigdda: str
-    kernels: str
+    mechanics: str
     numba: str
     numpy: str
     python: str
@@ -34,7 +33,7 @@ class Versions(msgspec.Struct, frozen=True):
         """Return the versions of this process."""
         return cls(
             rigdda=__version__,
-            kernels=kernels_hash(),
+            mechanics=MECHANICS,
             numba=numba.__version__,
             numpy=np.__version__,
             python=platform.python_version(),

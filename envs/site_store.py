@@ -1,24 +1,24 @@
 """Persistent store of barrier-free statistics of sites.
 
 Values are written to the cache of the user and also read from a file that ships with the package.
-Both are used only if they were computed by the current sources, see `sources`.
+Both are used only if they have the version of the mechanics (`rigdda.MECHANICS`) and the form
+(`FORMAT`) of this program.
 """
 
 from __future__ import annotations
 
-import hashlib
 import lzma
-from collections.abc import Mapping
-from contextlib import suppress
-from functools import cache, lru_cache
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
-import rigdda
+from rigdda import MECHANICS
 from rigdda.files import atomic
-from rigdda.kernel import cache_directory, source_hash
+from rigdda.kernel import cache_directory
 
 T = TypeVar("T")
 
@@ -26,29 +26,8 @@ SHIPPED = Path(__file__).parent / "site_store.msgpack.xz"
 """File that ships with the package, made by `python -m experiments.known_sites`."""
 
 
-STATISTICS = ("cost", "design_envelope", "ensemble", "envelope", "intervals", "outcome_cache",
-              "quantiles")  # fmt: skip
-"""Modules of this package that compute the statistics."""
-
-UNRELATED = ("agents", "envs", "replay", "sites", "validation", "corridor", "display",
-             "drawing", "errors", "files", "limit_equilibrium", "lumped_mass",
-             "rounding", "site_generator", "site_names", "survey")  # fmt: skip
-"""Folders and modules of `rigdda` that do not affect the releases of a given site. Those that make
-a site are among them, because values are stored by its content."""
-
-
-@cache
-def sources() -> str:
-    """Return a hash of all sources that affect barrier-free statistics, and of numba's version."""
-    digest = hashlib.sha256(source_hash().encode())
-    here, whole = Path(__file__).parent, Path(rigdda.__file__).parent
-    files = [here / f"{name}.py" for name in STATISTICS]
-    for path in sorted({*whole.rglob("*.py")} - {whole / "__init__.py"}):
-        if not {*path.relative_to(whole).with_suffix("").parts} & {*UNRELATED}:
-            files.append(path)
-    for path in files:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+FORMAT = 1
+"""Version of the form of stored values. Change it if a field of a stored class changes."""
 
 
 class Content(msgspec.Struct, frozen=True):
@@ -56,23 +35,48 @@ class Content(msgspec.Struct, frozen=True):
 
     Parameters
     ----------
-    sources : str
-        Hash of the sources that computed the values.
+    mechanics : str
+        Version of the mechanics that computed the values.
+    form : int
+        Version of the form of the values.
     values : mapping of str to bytes
         Encoded values by name and key.
     """
 
-    sources: str
+    mechanics: str
+    form: int
     values: dict[str, msgspec.Raw]
+
+    @property
+    def current(self) -> bool:
+        """Whether the values are of the mechanics and the form of this program."""
+        return (self.mechanics, self.form) == (MECHANICS, FORMAT)
+
+
+_ignored = False
+
+
+@contextmanager
+def ignored() -> Iterator[None]:
+    """Read nothing, so that values are computed again to be compared with the stored ones."""
+    global _ignored
+    _ignored = True
+    try:
+        yield
+    finally:
+        _ignored = False
 
 
 def path_of(name: str, key: bytes) -> Path:
     """Return the file of a value in the cache of the user, next to the compiled kernels."""
-    return cache_directory().parent / f"sites-{sources()}" / f"{name}-{key.hex()}.msgpack"
+    folder = f"sites-{MECHANICS}-{FORMAT}"
+    return cache_directory().parent / folder / f"{name}-{key.hex()}.msgpack"
 
 
 def read(name: str, key: bytes, kind: type[T]) -> T | None:
     """Return a stored value, or None if there is none or it cannot be decoded."""
+    if _ignored:
+        return None
     found: bytes | msgspec.Raw | None = None
     path = path_of(name, key)
     with suppress(OSError):
@@ -94,7 +98,7 @@ def write(name: str, key: bytes, value: Any) -> None:
 def pack(values: Mapping[str, Any]) -> bytes:
     """Return the content of the file that ships with the package, from values by name and key."""
     raw = {key: msgspec.Raw(msgspec.msgpack.encode(value)) for key, value in values.items()}
-    return lzma.compress(msgspec.msgpack.encode(Content(sources(), raw)), preset=9)
+    return lzma.compress(msgspec.msgpack.encode(Content(MECHANICS, FORMAT, raw)), preset=9)
 
 
 def unpack(packed: bytes) -> Content:
@@ -111,11 +115,14 @@ def unpack(packed: bytes) -> Content:
         raise ValueError(f"damaged statistics of sites ({error})") from None
 
 
+def shipped() -> Content | None:
+    """Return the content of the file that ships with the package, None if it is unreadable."""
+    with suppress(OSError, ValueError):
+        return unpack(SHIPPED.read_bytes())
+    return None
+
+
 @lru_cache(maxsize=1)
 def _shipped() -> dict[str, msgspec.Raw]:
-    """Return the values that ship with the package; empty if other sources computed them."""
-    with suppress(OSError, ValueError):
-        content = unpack(SHIPPED.read_bytes())
-        if content.sources == sources():
-            return content.values
-    return {}
+    """Return the values that ship with the package; empty if they are of another version."""
+    return content.values if (content := shipped()) and content.current else {}

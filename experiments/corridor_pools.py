@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Outcome, sites
+from rigdda import MECHANICS, Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Outcome, sites
 from rigdda.agents.designers import front, rule
 from rigdda.agents.designers.constant import place
 from rigdda.agents.designers.menu import Menu
@@ -20,7 +20,6 @@ from rigdda.agents.designers.protocol import release_seeds
 from rigdda.barriers import from_table, to_tables
 from rigdda.envs import DesignProblem
 from rigdda.envs.outcome_cache import pack, unpack
-from rigdda.envs.site_store import sources
 from rigdda.files import atomic
 
 FOLDER = Path("runs/corridor-pools")
@@ -102,7 +101,7 @@ class Pool:
 
     def _file(self, kind: str, *asked: object) -> Path:
         """Return the file of results that depend on the site and on some values."""
-        key = msgspec.json.encode([sources(), self.problem.site, *asked])
+        key = msgspec.json.encode([MECHANICS, self.problem.key.hex(), *asked])
         self._folder.mkdir(parents=True, exist_ok=True)
         return self._folder / f"{kind}-{hashlib.sha256(key).hexdigest()[:24]}"
 

@@ -33,14 +33,13 @@ from experiments.script import (
     say,
     write,
 )
-from rigdda import BadInput, Layout, sites
+from rigdda import MECHANICS, BadInput, Layout, sites
 from rigdda.agents import designers
 from rigdda.agents.cli import BUDGET
 from rigdda.agents.designers.protocol import verify
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import describe
 from rigdda.envs import DesignProblem, Evaluation
-from rigdda.envs.outcome_cache import mechanics
 
 COLOURS = {
     "race": RED, "random": GREY, "constant": "black", "rule": ORANGE, "cma": BLUE, "tpe": GREEN,
@@ -112,7 +111,7 @@ class Contest:
             "reported_low": found.evaluation.ci[0], "reported_high": found.evaluation.ci[1],
             "z_reference": least.objective, "z_nothing": nothing.objective,
             "distance": (e.objective - least.objective) / gain, "origin": found.origin,
-            "on_bound": "; ".join(found.on_bound), "mechanics": mechanics(),
+            "on_bound": "; ".join(found.on_bound), "mechanics": MECHANICS,
             "layout": "; ".join(map(describe, found.layout)),
         }  # fmt: skip
 
@@ -151,7 +150,7 @@ def load(path: Path) -> list[dict[str, str]]:
     if not path.is_file():
         return []
     with path.open(newline="", encoding="utf-8") as file:
-        return [r for r in csv.DictReader(file) if r["mechanics"] == mechanics()]
+        return [r for r in csv.DictReader(file) if r["mechanics"] == MECHANICS]
 
 
 def run(quick: bool, out: Path) -> Number:

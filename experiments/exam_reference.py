@@ -23,7 +23,7 @@ import msgspec
 import numpy as np
 
 from experiments.script import say
-from rigdda import Layout
+from rigdda import MECHANICS, Layout
 from rigdda.agents.corridor.planning import Planner
 from rigdda.agents.designers import race
 from rigdda.agents.designers.constant import constant
@@ -32,7 +32,6 @@ from rigdda.agents.designers.protocol import release_seeds, verify
 from rigdda.agents.exam import specification
 from rigdda.agents.exam.specification import Anchor, ExamCorridor, References, Specification, tables
 from rigdda.envs import CorridorProblem, DesignProblem
-from rigdda.kernel import kernels_hash
 
 CHOICE, VALUE = 0.1, 0.2
 """Releases for the choice of the reference and for its value, over those of its search [-]."""
@@ -100,12 +99,11 @@ def _walk(problem: CorridorProblem, money: float, rng: np.random.Generator, i: i
 
 
 def record(spec: Specification, file: Path, releases: int) -> References:
-    """Record references that are missing, had fewer releases or were made by other kernels."""
-    found = References(kernels_hash(), {})
+    """Record references that are missing, had fewer releases or are of other mechanics."""
+    found = References(MECHANICS, {})
     if file.is_file():
         known = msgspec.json.decode(file.read_bytes(), type=References)
-        made_now = known.mechanics == kernels_hash()
-        found = known if made_now or (spec.current and known.mechanics == spec.mechanics) else found
+        found = known if known.mechanics == MECHANICS else found
     for name in spec.sites:
         if _lacks(found, name, releases):
             say(name)

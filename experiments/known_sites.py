@@ -4,12 +4,11 @@
 the sites of the exam, and of the generated sites of some splits, and writes them to the file of
 `rigdda.envs.site_store`. The first `reset` on such a site reads them instead of simulating two
 thousand releases. The sites of Ritchie's tests are left out, as their masses take hours and no
-design starts there. The file is only used with the sources that made it, so it must be made last
-before a release. Values in the user's cache are not computed again.
+design starts there. Values in the user's cache are not computed again.
 
-If a source has changed in a way that does not affect results, `--keep N` makes the file quickly: N
-sites of the present file are computed again, and the values of all others are kept if those of the
-N sites are the same. Means of deposits may differ in the last bit, because libraries of linear
+The values of the present file are kept if they are of the current version of the mechanics. Some of
+its sites are computed again, and the command fails if their values have changed: then the version
+has to change, too. Means of deposits may differ in the last bit, because libraries of linear
 algebra sum up in an order that depends on the processor.
 """
 
@@ -46,15 +45,16 @@ ALWAYS = (
               type=click.Choice(tuple(sites.SPLITS)), help="May be repeated.")  # fmt: skip
 @click.option("--sites", "count", type=click.IntRange(1), default=60, show_default=True,
               help="Number of sites of each split.")  # fmt: skip
-@click.option("--keep", "checked", type=click.IntRange(1), metavar="N",
-              help="Keep the values if those of N sites are the same.")  # fmt: skip
+@click.option("--checked", type=click.IntRange(0), default=6, show_default=True,
+              help="Number of sites of the present file that are computed again.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path), default=site_store.SHIPPED,
               show_default=True, help="The file.")  # fmt: skip
-def main(splits: tuple[str, ...], count: int, checked: int | None, out: Path) -> None:
+def main(splits: tuple[str, ...], count: int, checked: int, out: Path) -> None:
     """Compute and write the file."""
     generated = (name for split in splits for name in sites.split(split)[:count])
     names = [*ALWAYS, *generated]
-    kept = {} if checked is None else kept_values(names, checked, out)
+    kept = kept_values(out)
+    check(names, kept, checked)
     values: dict[str, Any] = {}
     for name in names:
         site = Site.load(name)
@@ -82,20 +82,27 @@ def statistics(site: Site) -> dict[str, Any]:
     return dict(zip(keys(site), (found, seen), strict=True))
 
 
-def kept_values(names: Sequence[str], checked: int, file: Path) -> dict[str, msgspec.Raw]:
-    """Return the values of a file; none if those of some of its sites are no longer the same."""
+def kept_values(file: Path) -> dict[str, msgspec.Raw]:
+    """Return the values of a file; none if they are of another version of the mechanics."""
     if not file.is_file():
         return {}
-    values = site_store.unpack(file.read_bytes()).values
+    try:
+        content = site_store.unpack(file.read_bytes())
+    except ValueError:  # damaged, or of another form
+        return {}
+    return content.values if content.current else {}
+
+
+def check(names: Sequence[str], values: dict[str, msgspec.Raw], count: int) -> None:
+    """Compute some of the sites with known values again; fail if one of them has changed."""
     found = [name for name in names if all(key in values for key in keys(Site.load(name)))]
-    for i in np.unique(np.linspace(0, len(found) - 1, min(checked, len(found))).astype(int)):
-        site = Site.load(found[i])
-        now = statistics(site)
+    for i in np.unique(np.linspace(0, len(found) - 1, min(count, len(found))).astype(int)):
+        with site_store.ignored():
+            now = statistics(Site.load(found[i]))
         if not all(same(values[key], encoded(own)) for key, own in now.items()):
-            say(f"{found[i]} has changed: all sites are computed again")
-            return {}
+            mend = "change rigdda.MECHANICS, see CONTRIBUTING.md"
+            raise click.ClickException(f"the values of {found[i]} have changed: {mend}")
         say(f"{found[i]} is the same")
-    return values
 
 
 def encoded(value: Any) -> msgspec.Raw:

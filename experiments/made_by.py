@@ -1,21 +1,18 @@
-"""Provenance of recorded results: a hash of the kernels, noted beside each table.
-
-The hash is `rigdda.kernel.kernels_hash`.
-"""
+"""Provenance of recorded results: the version of the mechanics, noted beside each table."""
 
 from __future__ import annotations
 
 import csv
 from pathlib import Path
 
-KERNELS = "kernels.csv"
-"""Table in a folder of results that records which kernels made the other tables."""
+MADE_BY = "mechanics.csv"
+"""Table in a folder of results that records which mechanics made the other tables."""
 
 
 def made_by(folder: Path) -> dict[str, str]:
-    """Return the hash of the kernels that made each table of a folder, where recorded."""
-    path = folder / KERNELS
+    """Return `rigdda.MECHANICS` of each table of a folder when it was made, where recorded."""
+    path = folder / MADE_BY
     if not path.exists():
         return {}
     with path.open(newline="", encoding="utf-8") as file:
-        return {row["table"]: row["kernels"] for row in csv.DictReader(file)}
+        return {row["table"]: row["mechanics"] for row in csv.DictReader(file)}

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from experiments.script import Number, interval, main, say, write
 from experiments.search_gain import FRESH, QUICK_VERIFY, VERIFY, load, problems_of
-from rigdda import Layout, sites
+from rigdda import MECHANICS, Layout, sites
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.forecast import Value
 from rigdda.agents.designers.menu import Menu
@@ -31,7 +31,6 @@ from rigdda.agents.designers.rule import answer
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import describe
 from rigdda.envs import DesignProblem
-from rigdda.envs.outcome_cache import mechanics
 
 SITES, QUICK_SITES = 18, 2
 BUDGET = 20_000
@@ -78,7 +77,7 @@ def study(problem: DesignProblem, releases: int) -> list[dict[str, Any]]:
         e = verify(problem, built, releases, FRESH, store)
         found.append({
             "site": problem.site.name, "method": name, "z": e.objective, "z_low": e.ci[0],
-            "z_high": e.ci[1], "z_nothing": problem.nothing.objective, "mechanics": mechanics(),
+            "z_high": e.ci[1], "z_nothing": problem.nothing.objective, "mechanics": MECHANICS,
             "layout": "; ".join(map(describe, built)),
         })  # fmt: skip
     return found

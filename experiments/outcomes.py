@@ -2,9 +2,9 @@
 
 `python -m experiments.outcomes` computes a fixed set of releases, layouts, scenes and episodes, and
 compares a digest of each with the recorded one (`results/outcomes/outcomes.csv`). It lists the
-differences and exits with 1 if there are any. `--record` records the current digests. `--carry`
-marks all result tables made by the recorded kernels as made by the current kernels, provided that
-no digest differs, which shows that kernels were only renamed or moved.
+differences and exits with 1 if there are any. `--record` records the current digests, and the
+numbers of `experiments.short_outcomes`. Results that have changed need another version of the
+mechanics (`rigdda.MECHANICS`): they are not recorded with the one that the record has.
 
 The digests include all bits and are therefore specific to one type of machine.
 """
@@ -24,9 +24,11 @@ import gymnasium
 import numpy as np
 
 import rigdda.envs  # noqa: F401  registers the environments
-from experiments.made_by import KERNELS, made_by
-from experiments.script import RESULTS, put, say, write
+from experiments import short_outcomes
+from experiments.made_by import made_by
+from experiments.script import RESULTS, say, write
 from rigdda import (
+    MECHANICS,
     Bolt,
     Ditch,
     Embankment,
@@ -38,7 +40,6 @@ from rigdda import (
     Site,
 )
 from rigdda.envs import DesignProblem
-from rigdda.kernel import kernels_hash
 from rigdda.model.settings import Settings
 from rigdda.releases import Batch
 from rigdda.validation.case import evaluate
@@ -171,42 +172,28 @@ def recorded(out: Path) -> dict[str, str]:
         return {row["what"]: row["digest"] for row in csv.DictReader(file)}
 
 
-def carry(out: Path) -> list[Path]:
-    """Mark tables made by the recorded kernels as made by the current ones; return these tables."""
-    old, new = made_by((out / TABLE).parent).get(TABLE.name), kernels_hash()
-    carried = []
-    for path in sorted(out.rglob(KERNELS)):
-        made = made_by(path.parent)
-        tables = [table for table, kernels in made.items() if kernels == old != new]
-        if tables:
-            carried += [path.parent / table for table in tables]
-            made |= dict.fromkeys(tables, new)
-            put(path, [{"table": k, "kernels": made[k]} for k in sorted(made)])
-    return carried
-
-
 @click.command(help=__doc__)
-@click.option("--record", is_flag=True, help="Record the current digests.")
-@click.option("--carry", "carries", is_flag=True, help="Mark recorded tables as current.")
+@click.option("--record", "records", is_flag=True, help="Record the current outcomes.")
 @click.option("--out", type=click.Path(path_type=Path), default=RESULTS, show_default=True,
               help="Folder of results.")  # fmt: skip
-def main(record: bool, carries: bool, out: Path) -> None:
-    """Compute and compare the digests; record them or carry over tables."""
+def main(records: bool, out: Path) -> None:
+    """Compute and compare the digests, or record them."""
     before, rows, other = recorded(out), [], []
     for what, call in computed():
         found = call()
         rows.append({"what": what, "digest": found})
-        if found != before.get(what):
+        same = found == before.get(what, found)
+        if not same:
             other.append(what)
-        same = record or found == before.get(what)
         say(f"{found} {what}{'' if same else ': differs from the record'}")
-    if record:
-        write(out / TABLE, rows)
-        return
-    if carries and not other:
-        for table in carry(out):
-            click.echo(f"{table}: marked as made by the current kernels")
     click.echo(f"{len(other)} of {len(rows)} differ from the record")
+    if other and made_by((out / TABLE).parent).get(TABLE.name) == MECHANICS:
+        mend = f"change rigdda.MECHANICS, which is {MECHANICS!r}, and then record the outcomes"
+        raise click.ClickException(mend)
+    if records:
+        write(out / TABLE, rows)
+        short_outcomes.record(out)
+        return
     sys.exit(bool(other))
 
 

@@ -7,7 +7,7 @@ are verified on fresh releases, until half the 95 % interval of the best is belo
 barriers. Among layouts within that difference, the one with the fewest barriers is the best.
 
 Writes reference.csv, one row per layout, and reference.png. An interrupted run is resumed: sites
-whose rows were made by the current kernels are not computed again.
+whose rows were made by the current mechanics are not computed again.
 """
 
 from __future__ import annotations
@@ -24,14 +24,13 @@ from msgspec.structs import replace
 
 from experiments.contenders import contenders, kinds_of
 from experiments.script import BLUE, GREY, RED, Number, draw, main, say, write
-from rigdda import Layout, Site, sites
+from rigdda import MECHANICS, Layout, Site, sites
 from rigdda.agents.designers.constant import CONSTANTS, constant, place
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import verify
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import describe, from_table, to_tables
 from rigdda.envs import DesignProblem, Evaluation
-from rigdda.envs.outcome_cache import mechanics
 
 STATIONS, QUICK_STATIONS = 24, 6
 """Number of chainages across the zone for single barriers."""
@@ -121,7 +120,7 @@ def row(problem: DesignProblem, what: str, e: Evaluation, seconds: float) -> dic
         "z": e.objective, "z_low": e.ci[0], "z_high": e.ci[1], "capital": e.capital,
         "harm": e.harm, "repair": e.repair, "cost": e.cost, "debris_share": e.debris_share,
         "releases": e.releases, "z_nothing": base, "groups_share": groups / base,
-        "cpu_s": seconds, "mechanics": mechanics(),
+        "cpu_s": seconds, "mechanics": MECHANICS,
         "layout": json.dumps(to_tables(e.layout)),
     }  # fmt: skip
 
@@ -176,7 +175,7 @@ def run(quick: bool, out: Path) -> Number:
     """Write reference.csv and reference.png."""
     path = out / "reference.csv"
     rows: list[Any] = []
-    known = [r for r in load(path) if r["mechanics"] == mechanics()]
+    known = [r for r in load(path) if r["mechanics"] == MECHANICS]
     for name in sites.design_names():
         own: list[Any] = [r for r in known if r["site"] == name]
         rows += own or study(name, quick)

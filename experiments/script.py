@@ -19,10 +19,10 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from experiments.made_by import KERNELS, made_by
+from experiments.made_by import MADE_BY, made_by
+from rigdda import MECHANICS
 from rigdda.envs.intervals import quantile
 from rigdda.files import atomic
-from rigdda.kernel import kernels_hash
 
 RESULTS = Path("experiments/results")
 """Folder of recorded results; those of quick runs are in its subfolder `quick`."""
@@ -119,10 +119,10 @@ def say(what: str) -> None:
 
 
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows as CSV and note the kernels that made them, see `experiments.made_by`."""
+    """Write rows as CSV and note the version of the mechanics, see `experiments.made_by`."""
     put(path, rows)
-    made = made_by(path.parent) | {path.name: kernels_hash()}
-    put(path.parent / KERNELS, [{"table": k, "kernels": made[k]} for k in sorted(made)])
+    made = made_by(path.parent) | {path.name: MECHANICS}
+    put(path.parent / MADE_BY, [{"table": k, "mechanics": made[k]} for k in sorted(made)])
 
 
 def put(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -19,14 +19,13 @@ from pathlib import Path
 from typing import Any
 
 from experiments.script import Number, interval, main, say, write
-from rigdda import sites
+from rigdda import MECHANICS, sites
 from rigdda.agents import designers
 from rigdda.agents.designers.protocol import verify
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import describe
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
-from rigdda.envs.outcome_cache import mechanics
 
 NAMES = (designers.DEFAULT, "random")
 BUDGETS, QUICK_BUDGETS = (500, 2_000, 20_000), (200,)
@@ -67,7 +66,7 @@ def row(
         "releases": found.simulations, "cpu_s": found.seconds, "z": e.objective,
         "z_low": e.ci[0], "z_high": e.ci[1], "reported": found.evaluation.objective,
         "z_nothing": problem.nothing.objective, "origin": found.origin,
-        "mechanics": mechanics(), "layout": "; ".join(map(describe, found.layout)),
+        "mechanics": MECHANICS, "layout": "; ".join(map(describe, found.layout)),
     }  # fmt: skip
 
 
@@ -76,7 +75,7 @@ def load(path: Path) -> list[dict[str, str]]:
     if not path.is_file():
         return []
     with path.open(newline="", encoding="utf-8") as file:
-        return [r for r in csv.DictReader(file) if r["mechanics"] == mechanics()]
+        return [r for r in csv.DictReader(file) if r["mechanics"] == MECHANICS]
 
 
 def gains(rows: Sequence[Any], budget: int) -> list[float]:

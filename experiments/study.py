@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from experiments.script import say, write
+from rigdda import MECHANICS
 from rigdda.files import atomic
-from rigdda.kernel import kernels_hash
 
 Row = dict[str, Any]
 
@@ -25,8 +25,8 @@ def tabulate(
     """Measure all cases, write the table and return its rows.
 
     A row has the columns of its case followed by the measured ones. Until the table is complete,
-    rows are saved beside it under the hash of the kernels: an interrupted study is resumed if the
-    kernels are the same, and restarted otherwise.
+    rows are saved beside it under the version of the mechanics: an interrupted study is resumed if
+    it is the same, and restarted otherwise.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def tabulate(
     processes : int
         Number of cases measured at once; more than one only if each starts its own process.
     """
-    kept = path.with_name(f"{path.stem}-{kernels_hash()}.part.json")
+    kept = path.with_name(f"{path.stem}-{MECHANICS}.part.json")
     rows: list[Row] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else []
     by_case = {key(row, cases[0]): row for row in rows}
     todo = [case for case in cases if key(case, case) not in by_case]

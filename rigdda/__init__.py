@@ -7,4 +7,12 @@ import lazy_loader
 
 __version__ = "0.2.0"
 
+MECHANICS = "0"
+"""Version of everything that determines results: the mechanics, what is drawn from seeds, the
+generator of sites, costs and statistics.
+
+Stored results are used only if they have this version. CONTRIBUTING.md says when to change it. It
+is a part of file names.
+"""
+
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -37,6 +37,7 @@ from .model.terrain import Terrain
 from .model.traffic import Toll, Traffic
 from .releases import release, release_many, release_outcome
 
+MECHANICS: str
 __version__: str
 
 __all__ = [

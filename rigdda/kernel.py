@@ -4,40 +4,61 @@ numba's own cache only checks the file of the compiled function: after an edit o
 callee in another module, the cached function keeps the old code. The cache directory is therefore
 named by a hash of all sources of kernels. If the cache cannot be read or written, kernels are
 compiled again.
+
+Compilation is shortened by `rigdda.numba_internals`, which replaces internal parts of numba. If
+numba does not have these parts as expected, or if the environment variable `RIGDDA_PLAIN_NUMBA` is
+set, kernels are compiled by numba as it is. The results are the same, but compilation takes 2.5
+times and simulations nine times as long, as arrays are counted.
 """
 
 from __future__ import annotations
 
-import ast
-import contextlib
 import functools
-import gc
 import hashlib
 import os
-import pickle
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numba
 import numpy as np
-from numba.core import config
-from numba.core.caching import FunctionCache, IndexDataCacheFile
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, Flags
-from numba.core.targetconfig import TargetConfig
+from numba import config
 
 from rigdda.errors import Error
 
-DECORATORS = ("kernel", "inlined", "arithmetic_kernel", "stage", "entry_kernel")
-"""Decorators of compiled functions."""
+PLAIN = "RIGDDA_PLAIN_NUMBA"
+"""Environment variable with which kernels are compiled by numba as it is, if it is not empty."""
+
+
+def _internals() -> ModuleType | None:
+    """Return `rigdda.numba_internals`, None if numba has to be used as it is."""
+    if os.environ.get(PLAIN):
+        return None
+    try:
+        from rigdda import numba_internals
+
+        other = numba_internals.unexpected()
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        other = [str(error)]
+    if other:
+        message = f"numba {numba.__version__} differs from the versions that rigdda was tested "
+        message += f"with ({', '.join(other)}): compilation and simulations take longer"
+        warnings.warn(message, RuntimeWarning, stacklevel=2)
+        return None
+    numba_internals.compare_quickly()
+    return numba_internals
+
+
+INTERNALS = _internals()
+"""Replacements of internal parts of numba, None if numba is used as it is."""
 
 
 def sources() -> list[bytes]:
-    """Return the sources that contain kernels or their constants."""
-    found, data = [], ("constants.py", "records.py", "arrays.py")
+    """Return the sources that contain kernels or their constants, or determine the cache."""
+    found, data = [], ("constants.py", "records.py", "arrays.py", "numba_internals.py")
     here = Path(__file__).parent
     folders = (here / "dynamics", here / "model")
     for path in sorted([*here.glob("*.py"), *(p for f in folders for p in f.rglob("*.py"))]):
@@ -48,62 +69,13 @@ def sources() -> list[bytes]:
 
 
 def source_hash() -> str:
-    """Return a hash of numba's version and of all kernel sources."""
+    """Return a hash of numba's version and of all kernel sources, which names the cache.
+
+    Stored results are not named by it but by `rigdda.MECHANICS`.
+    """
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sources():
         digest.update(source)
-    return digest.hexdigest()[:16]
-
-
-def _is_text(part: ast.AST) -> bool:
-    """Return whether a statement is a docstring."""
-    value = part.value if isinstance(part, ast.Expr) else None
-    return isinstance(value, ast.Constant) and isinstance(value.value, str)
-
-
-def _is_kernel(part: ast.stmt) -> bool:
-    """Return whether a statement is a compiled function."""
-    if not isinstance(part, ast.FunctionDef):
-        return False
-    return any(isinstance(d, ast.Name) and d.id in DECORATORS for d in part.decorator_list)
-
-
-def _is_driver(part: ast.stmt) -> bool:
-    """Return whether a statement is ordinary code, as in modules that only call kernels."""
-    if isinstance(part, ast.FunctionDef):
-        return not part.name.startswith("_")
-    return isinstance(part, ast.ClassDef) and not part.bases
-
-
-def kernel_statements(source: bytes) -> list[str]:
-    """Return the code of the kernels, constants and array layouts of a module.
-
-    Docstrings and comments are removed, and the layout is uniform. A module that only calls kernels
-    has none.
-    """
-    tree = ast.parse(source)
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            node.body = [part for part in body if not _is_text(part)]  # type: ignore[attr-defined]
-    kernels = [part for part in tree.body if _is_kernel(part)]
-    if not kernels and any(map(_is_driver, tree.body)):
-        return []
-    data = ast.Assign | ast.AnnAssign | ast.ClassDef
-    return [ast.unparse(part) for part in tree.body if part in kernels or isinstance(part, data)]
-
-
-@functools.cache
-def kernels_hash() -> str:
-    """Return a hash of numba's version and of the code of kernels and their constants.
-
-    Unlike `source_hash`, it does not change with comments, docstrings or the module that contains a
-    kernel. It tells whether results were computed by the same mechanics.
-    """
-    parts = [part for source in sources() for part in kernel_statements(source)]
-    digest = hashlib.sha256(numba.__version__.encode())
-    for part in sorted(parts):
-        digest.update(part.encode())
     return digest.hexdigest()[:16]
 
 
@@ -115,7 +87,7 @@ def cache_directory() -> Path:
     Error
         If none of these folders is writable.
     """
-    name = f"kernels-{source_hash()}"
+    name = f"{'plain' if INTERNALS is None else 'kernels'}-{source_hash()}"
     for find in (_cache_home, _temporary_home, _process_home):
         home = find()
         if home is not None and _is_writable(home / name):
@@ -171,170 +143,21 @@ def _is_writable(folder: Path) -> bool:
     return True
 
 
-class CheckedFile(IndexDataCacheFile):
-    """Cache files whose machine code carries its hash.
-
-    After a crash of the machine, a file may have its full length but contain zeros. Machine code
-    from such a file would crash the process or compute wrong results.
-    """
-
-    def _save_data(self, name: str, data: Any) -> None:
-        code = self._dump(data)
-        super()._save_data(name, (hashlib.sha256(code).digest(), code))
-
-    def _load_data(self, name: str) -> Any:
-        digest, code = super()._load_data(name)
-        if hashlib.sha256(code).digest() != digest:
-            raise ValueError("the machine code is not what was written")
-        return pickle.loads(code)
-
-
-class KernelCache(FunctionCache):
-    """numba's function cache, except that unreadable or unwritable files are tolerated.
-
-    numba raises any error from unpickling such files. Here they are deleted and compiled again.
-    """
-
-    def __init__(self, function: Callable[..., Any]):
-        super().__init__(function)
-        stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = CheckedFile(self._cache_path, self._impl.filename_base, stamp)
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled function of a signature, None if it is missing or damaged."""
-        try:
-            return super().load_overload(sig, target_context)
-        except Exception:  # damaged files may raise any exception
-            with contextlib.suppress(OSError):
-                self.flush()
-            return None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Save a compiled function; warn if that fails, for example on a full disk."""
-        try:
-            super().save_overload(sig, data)
-        except OSError as error:
-            warnings.warn(f"compiled kernels are not kept: {error}", RuntimeWarning, stacklevel=2)
-
-
-class _OptionValues:
-    """Cache of the values of all compilation options, including defaults.
-
-    For every operator and call in a kernel, numba looks up templates in dictionaries whose keys
-    contain the compilation options. Each comparison of two keys reads about 36 options of both
-    through properties, which adds up to a third of the compilation time of the kernels. The objects
-    are stored with their values, so that their identities remain unique.
-    """
-
-    def __init__(self) -> None:
-        self._known: dict[Any, tuple[dict[str, Any], dict[str, Any]]] = {}
-
-    def of(self, options: TargetConfig) -> dict[str, Any]:
-        """Return the value of every option."""
-        given = options._values
-        key = (type(options), tuple(given), tuple(map(id, given.values())))
-        known = self._known.get(key)
-        if known is None:
-            known = self._known[key] = options.values(), dict(given)
-        return known[0]
-
-
-def _compare_quickly() -> None:
-    """Replace numba's comparison of compilation options by an equivalent one, ten times faster."""
-    values = _OptionValues()
-
-    def equal(self: TargetConfig, other: object) -> bool:
-        if not isinstance(other, TargetConfig):
-            return NotImplemented
-        one, two = values.of(self), values.of(other)
-        return one is two or one == two
-
-    def number(self: TargetConfig) -> int:
-        return len(self.options)  # numba only hashes the names of the options
-
-    Flags.__eq__, Flags.__hash__ = equal, number
-
-
-_compare_quickly()
-
-
-class LinkedLibrary(JITCodeLibrary):
-    """Library of a kernel that only kernels call: intermediate code, to be linked into callers.
-
-    numba optimises each kernel together with all its callees and generates machine code for it,
-    although only the machine code of entry kernels is executed. Here the optimisation of whole
-    modules and the machine code are left to the entry kernels, which saves a sixth of the
-    compilation time. The results are the same to the last bit.
-    """
-
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
-        self._finalized = True
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """Return 0, the address of a function without machine code."""
-        self._ensure_finalized()
-        return 0
-
-    @property
-    def codegen(self) -> LinkedLibrary:
-        """Return the object on which numba calls `set_env`, which is this library."""
-        return self
-
-    def set_env(self, name: str, environment: Any) -> None:
-        """Ignore the environment, which machine code needs to raise exceptions."""
-
-
-class LinkedCompiler(Compiler):
-    """Compiler of kernels that only kernels call."""
-
-    def define_pipelines(self) -> list[Any]:
-        """Compile into a `LinkedLibrary`."""
-        codegen = self.state.targetctx.codegen()
-        self.state.library = LinkedLibrary(codegen, self.state.func_id.func_qualname)
-        return super().define_pipelines()
-
-
-@contextlib.contextmanager
-def _without_collection() -> Iterator[None]:
-    """Pause the collection of cyclic garbage, which takes a fifteenth of a compilation."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
-
-
-class EntryCompiler(Compiler):
-    """Compiler of kernels that Python calls, together with all kernels that they call."""
-
-    def compile_extra(self, function: Callable[..., Any]) -> Any:
-        """Compile a function."""
-        with _without_collection():
-            return super().compile_extra(function)
-
-
 INSIDE: dict[str, Any] = {
-    "pipeline_class": LinkedCompiler,
     "nogil": True,
     "error_model": "numpy",
-    "_nrt": False,
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
+    **(INTERNALS.INSIDE if INTERNALS else {}),
 }
 """Compiler options of kernels that are called by kernels only.
 
-Kernels allocate nothing, so reference counting is disabled by `_nrt=False`; its atomic operations
-on every array argument would take four fifths of a step. Compilation without wrappers for calls
-from Python and C takes two thirds of the time. Calling such a kernel from Python crashes, see
-`from_python`.
+Calling such a kernel from Python crashes, see `from_python`.
 """
+
+ENTRY: dict[str, Any] = {
+    "error_model": "numpy",
+    **(INTERNALS.ENTRY if INTERNALS else {"cache": True}),
+}
+"""Compiler options of kernels that are called by Python."""
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -379,14 +202,13 @@ def short_kernel(function: Callable[..., Any]) -> Any:
 
 
 def _kept(function: Callable[..., Any], nogil: bool) -> Any:
-    options = {"pipeline_class": EntryCompiler, "no_cpython_wrapper": False, "nogil": nogil}
-    compiled = numba.njit(**{**INSIDE, **options})(function)
     if config.DISABLE_JIT:
-        return compiled
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_directory())
+        return function
+    before, config.CACHE_DIR = config.CACHE_DIR, str(cache_directory())
     try:
-        compiled._cache = KernelCache(function)  # numba has no other way to give it one
+        compiled = numba.njit(nogil=nogil, **ENTRY)(function)
+        if INTERNALS is not None:
+            compiled._cache = INTERNALS.KernelCache(function)  # there is no public way
     finally:
         config.CACHE_DIR = before
     return compiled
@@ -412,8 +234,9 @@ class Direct:
     def _choose(self, *arguments: Any) -> Any:
         """Call the kernel for the first time, which compiles it."""
         result = self._entry(*arguments)
+        self.call = self._entry
         for compiled in getattr(self._entry, "overloads", {}).values():  # none if JIT is disabled
-            self.call = compiled.entry_point
+            self.call = getattr(compiled, "entry_point", self._entry)
         return result
 
 
@@ -429,4 +252,5 @@ def variable(value: int) -> int:
 
 def from_python(inner: Any) -> Any:
     """Compile a kernel again for calls from Python, for tests."""
-    return numba.njit(error_model="numpy", _nrt=False)(inner.py_func)
+    counts = INTERNALS.WITHOUT_COUNTS if INTERNALS else {}
+    return numba.njit(error_model="numpy", **counts)(inner.py_func)

@@ -22,7 +22,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from rigdda import BadInput, Corridor, Layout, __version__, check, distribution
+from rigdda import MECHANICS, BadInput, Corridor, Layout, __version__, check, distribution
 from rigdda.agents.corridor import allocation, programme
 from rigdda.agents.corridor.programme import METHODS, Choice, Increment, Options
 from rigdda.agents.designers import front
@@ -32,7 +32,6 @@ from rigdda.agents.limits import SEED
 from rigdda.barriers import from_table, to_tables
 from rigdda.envs import CorridorEvaluation, CorridorProblem, DesignProblem, Evaluation
 from rigdda.envs.intervals import Estimate, Mean, estimate, total
-from rigdda.envs.outcome_cache import mechanics
 from rigdda.envs.problem import excess
 from rigdda.files import atomic
 
@@ -248,7 +247,7 @@ class Planner:
         """Return the file of stored results that depend on some values, None without a folder."""
         if self._folder is None:
             return None
-        key = msgspec.json.encode([__version__, mechanics(), *asked])
+        key = msgspec.json.encode([__version__, MECHANICS, *asked])
         return self._folder / f"{kind}-{hashlib.sha256(key).hexdigest()[:16]}.json"
 
     def _seed(self, s: int) -> int:
@@ -262,7 +261,8 @@ class Planner:
         """Search the front of every section."""
         budget = int(SEARCH * self.releases)
         asks = [(problem, budget, self._seed(s)) for s, problem in enumerate(self.problem.problems)]
-        files = [self._file("front", p.site, p.kinds, p.max_barriers, *ask) for p, *ask in asks]
+        own = [(p.key.hex(), p.kinds, p.max_barriers, *ask) for p, *ask in asks]
+        files = [self._file("front", *values) for values in own]
         found = [_read(file) for file in files]
         new = distribution.mapped(
             self._searched if distribution.current() is None else _searched,

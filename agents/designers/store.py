@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from rigdda import BadInput, DoubtfulInput, Layout, Outcome, __version__, distribution
+from rigdda import MECHANICS, BadInput, DoubtfulInput, Layout, Outcome, __version__, distribution
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.intervals import estimate
-from rigdda.envs.outcome_cache import mechanics, pack
+from rigdda.envs.outcome_cache import pack
 from rigdda.files import atomic
 
 FILE = "problem.json"
@@ -60,7 +60,7 @@ def record_problem(folder: Path, problem: DesignProblem, *files: str) -> None:
 def identity(problem: DesignProblem) -> dict[str, Any]:
     """Return the values that identify a problem.
 
-    `content` is a hash of the site including its prices and rates.
+    `content` is a hash of the site including its prices and rates, but not its texts.
     """
     return {
         "site": problem.site.name,
@@ -71,7 +71,7 @@ def identity(problem: DesignProblem) -> dict[str, Any]:
         "max_cost": problem.max_cost,
         "fidelity": problem.fidelity,
         "checks": problem.checks,
-        "content": hashlib.sha256(msgspec.json.encode(problem.site)).hexdigest()[:16],
+        "content": problem.key.hex()[:16],
     }
 
 
@@ -349,5 +349,5 @@ def _sum(key: str, data: Any) -> str:
 
 def _key(problem: DesignProblem, layout: Layout, seeds: Any) -> str:
     """Return a hash of everything that an evaluation depends on."""
-    asked = [__version__, mechanics(), problem.site, problem.targets, list(layout), seeds]
+    asked = [__version__, MECHANICS, problem.key.hex(), problem.targets, list(layout), seeds]
     return hashlib.sha256(msgspec.json.encode(asked)).hexdigest()[:32]

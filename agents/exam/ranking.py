@@ -216,7 +216,7 @@ def remarks(asked: ExamPart, references: References) -> list[str]:
     found = []
     if not asked.specification.current:
         found.append(
-            "the kernels are not those of the references: this is another version of the exam, "
+            "the mechanics are not those of the references: this is another version of the exam, "
             "whose scores must not be compared with the leaderboard"
         )
     elif not asked.complete:

@@ -24,7 +24,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from rigdda import BadInput, Layout, __version__, check
+from rigdda import MECHANICS, BadInput, Layout, __version__, check
 from rigdda.agents.designers import rule
 from rigdda.agents.designers.store import Store
 from rigdda.agents.exam import entrant
@@ -44,7 +44,6 @@ from rigdda.agents.limits import SEED
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.observation import observe
 from rigdda.files import atomic
-from rigdda.kernel import kernels_hash
 
 Tick = Callable[[int, str], None]
 
@@ -298,7 +297,7 @@ class Scorer:
         """Read what the folder has of this run, and note to which run it belongs."""
         names = self.entry, self.corridor_entry
         code = [source_hash_of(name) for name in names if name]
-        own = [self.asked.specification.key, self.asked.seed, *names, *code, kernels_hash()]
+        own = [self.asked.specification.key, self.asked.seed, *names, *code, MECHANICS]
         file, identity = (
             self.folder / IDENTITY,
             {"run": msgspec.json.encode([__version__, *own]).decode()},

@@ -9,12 +9,11 @@ from typing import Annotated, Any
 
 import msgspec
 
-from rigdda import BadInput, Corridor, Layout, Site, fields
+from rigdda import MECHANICS, BadInput, Corridor, Layout, Site, fields
 from rigdda.barriers import from_table, to_tables
 from rigdda.envs import DesignProblem
 from rigdda.fields import about
 from rigdda.files import atomic, read
-from rigdda.kernel import kernels_hash
 from rigdda.model.corridor import CorridorSection
 
 SHIPPED = Path(__file__).parent / "specification.toml"
@@ -40,7 +39,7 @@ class Specification(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The exam: sites, corridors, budgets, and the mechanics of the references."""
 
     version: Annotated[int, about("Version of the exam.", least=None)]
-    mechanics: Annotated[str, about("Hash of the kernels that computed the references.")]
+    mechanics: Annotated[str, about("Version of the mechanics that computed the references.")]
     budgets: Annotated[tuple[int, ...], about("Releases that an entry may use per section.")]
     verification: Annotated[int, about("Releases for the verification of each layout.", ge=10)]
     max_barriers: Annotated[int, about("Largest number of barriers of a layout.", ge=1)]
@@ -48,21 +47,16 @@ class Specification(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     reference_releases: Annotated[int, about("Releases of the search for a reference.", ge=200)]
     sites: Annotated[tuple[str, ...], about("Names or files of the sites.", least=1)]
     corridors: Annotated[tuple[ExamCorridor, ...], about("The corridors.")] = ()
-    equivalent: Annotated[
-        tuple[str, ...], about("Hashes of other kernels with the same outcomes, bit for bit.")
-    ] = ()
 
     @property
     def current(self) -> bool:
-        """Whether the kernels of this installation have the outcomes of the references."""
-        return kernels_hash() in (self.mechanics, *self.equivalent)
+        """Whether this installation has the mechanics of the references."""
+        return self.mechanics == MECHANICS
 
     @property
     def key(self) -> str:
-        """Hash of all values of the specification except the equivalent kernels."""
-        values = msgspec.to_builtins(self)
-        del values["equivalent"]
-        return hashlib.sha256(msgspec.json.encode(values)).hexdigest()[:16]
+        """Hash of all values of the specification."""
+        return hashlib.sha256(msgspec.json.encode(self)).hexdigest()[:16]
 
     def problem(self, site: str) -> DesignProblem:
         """Return the design problem of a site."""

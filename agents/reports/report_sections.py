@@ -310,12 +310,13 @@ def repeat(folders: Folders) -> Iterator[Block]:
     records = [(folder, record) for folder in folders for record in folder.records.values()]
     commands = [shlex.join(["rigdda", *record.arguments]) for _, record in records]
     yield Listing("\n".join(commands))
-    head = ("results", "command", "began (UTC)", "ended (UTC)", "seed", "rigdda", "mechanics")
+    head = ("results", "command", "began (UTC)", "ended (UTC)", "seed", "rigdda")
     rows = [_run(folder, record) for folder, record in records]
-    yield listed("Runs", "mechanics: hash of all sources that affect a result.", head, rows)
+    yield listed("Runs", "", head, rows)
     versions = dict.fromkeys(record.versions for _, record in records)
-    names = ("rigdda", "kernels", "numba", "numpy", "python", "machine")
-    yield listed("Versions", "", names, [[getattr(v, name) for name in names] for v in versions])
+    names = ("rigdda", "mechanics", "numba", "numpy", "python", "machine")
+    rows = [[getattr(v, name) for name in names] for v in versions]
+    yield listed("Versions", "mechanics: version of everything that affects a result.", names, rows)
     rest = [_options(record) for _, record in records]
     yield listed("Options", "All options, also those that were not typed.", ("command", "options"),
                  rest)  # fmt: skip
@@ -325,7 +326,7 @@ def _run(folder: ResultsFolder, record: RunRecord) -> list[str]:
     seed = record.options.get("seed")
     began, ended = (time[:19].replace("T", " ") for time in (record.started, record.ended))
     return [folder.label, record.command, began, ended, "-" if seed is None else str(seed),
-            record.versions.rigdda, record.mechanics]  # fmt: skip
+            record.versions.rigdda]  # fmt: skip
 
 
 def _options(record: RunRecord) -> list[str]:

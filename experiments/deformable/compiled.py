@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import config
+from numba import config
 
-from rigdda.kernel import cache_directory
+from rigdda.kernel import ENTRY, cache_directory
 
 
 def entry(function: Callable[..., Any]) -> Any:
@@ -22,6 +22,6 @@ def entry(function: Callable[..., Any]) -> Any:
     folder.mkdir(exist_ok=True)
     before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
     try:
-        return numba.njit(nogil=True, cache=True, error_model="numpy", _nrt=False)(function)
+        return numba.njit(**{**ENTRY, "nogil": True, "cache": True})(function)
     finally:
         config.CACHE_DIR = before

@@ -15,7 +15,7 @@ from experiments.outcome_cost.cost import Sample, judge, sampled
 from experiments.outcome_cost.engines import CORE, REFERENCE, Setting, settings
 from experiments.outcome_cost.sample import Core, Peer, Points, Release
 from experiments.script import say
-from rigdda.envs.outcome_cache import mechanics
+from rigdda import MECHANICS
 from rigdda.files import atomic
 
 JUDGED = 0.03
@@ -62,7 +62,7 @@ def made() -> str:
     """Return a hash of everything that releases depend on: mechanics, engines, measurement."""
     here = Path(__file__).parent
     sources = [here / "sample.py", *sorted((here.parent / "bench" / "engines").glob("*.py"))]
-    digest = hashlib.sha256(mechanics().encode())
+    digest = hashlib.sha256(MECHANICS.encode())
     for path in sources:
         digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.envs.outcome_cache import mechanics
+from rigdda import MECHANICS
 from rigdda.files import atomic
 
 Outcomes = tuple[NDArray[np.float64], float]
@@ -19,10 +19,10 @@ Outcomes = tuple[NDArray[np.float64], float]
 def kept(folder: Path, name: str, what: object, compute: Callable[[], Outcomes]) -> Outcomes:
     """Return the stored result with this name, or else compute and store it.
 
-    A stored result is valid only for the same sources of the mechanics and the same `repr` of
+    A stored result is valid only for the same version of the mechanics and the same `repr` of
     `what`.
     """
-    digest = hashlib.sha256(repr((mechanics(), what)).encode()).hexdigest()[:12]
+    digest = hashlib.sha256(repr((MECHANICS, what)).encode()).hexdigest()[:12]
     path = folder / f"{name}-{digest}.npz"
     if path.exists():
         with np.load(path) as found:

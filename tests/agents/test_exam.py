@@ -13,21 +13,20 @@ import msgspec
 import numpy as np
 import pytest
 
-from rigdda import BadInput, Ditch, sites
+from rigdda import MECHANICS, BadInput, Ditch, sites
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.exam import counter, ranking, scorer, specification
 from rigdda.agents.exam.counter import practice
 from rigdda.agents.exam.specification import Anchor, References, tables
 from rigdda.envs import DesignProblem
-from rigdda.kernel import kernels_hash
 from rigdda.model.site_names import SPLITS, instance
 
 SITES = ("narrow-2000000003", "cliff-2000000004")
 
 SPEC = f"""
 version = 7
-mechanics = "{kernels_hash()}"
+mechanics = "{MECHANICS}"
 budgets = [0, 60]
 verification = 40
 max_barriers = 2
@@ -128,7 +127,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         anchors[name] = Anchor(tables((layout,)), 50.0, (40.0, 60.0), 200.0, 300.0, 2000)
     both = [anchors[name].layouts[0] for name in SITES]
     anchors["road"] = Anchor(both, 2000.0, (1900.0, 2100.0), 9000.0, 10000.0, 2000)
-    References(kernels_hash(), anchors).save(home / "references.json")
+    References(MECHANICS, anchors).save(home / "references.json")
     return home
 
 
@@ -319,8 +318,8 @@ def test_an_exam_without_references_is_refused(folder: Path) -> None:
         scorer.part(asked, sites=3)
 
 
-def test_equivalent_kernels_keep_the_specification_current() -> None:
-    known = specification.load()
-    other = msgspec.structs.replace(known, mechanics="0ld", equivalent=(kernels_hash(),))
-    assert other.current and not msgspec.structs.replace(other, equivalent=()).current
-    assert msgspec.structs.replace(known, equivalent=("0ther",)).key == known.key != other.key
+def test_a_specification_is_current_with_the_mechanics_of_its_references() -> None:
+    known = msgspec.structs.replace(specification.load(), mechanics=MECHANICS)
+    other = msgspec.structs.replace(known, mechanics="0ld")
+    assert known.current and not other.current
+    assert known.key != other.key

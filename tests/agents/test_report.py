@@ -28,13 +28,12 @@ import msgspec
 import pytest
 
 import rigdda
-from rigdda import BadInput, Site
+from rigdda import MECHANICS, BadInput, Site
 from rigdda.agents import browser, cli, report_server
 from rigdda.agents.reports import assumptions, report_sections
 from rigdda.agents.reports.exhibits import EXHIBITS
 from rigdda.agents.reports.html_blocks import inline
 from rigdda.agents.run_record import RunRecord, read
-from rigdda.envs.outcome_cache import mechanics
 
 DESIGN = [
     "design", "chute.toml", "--budget", "60", "--verify", "40", "--target", "0.05",
@@ -239,7 +238,7 @@ def test_commands_seeds_and_versions_are_there(made: Made) -> None:
     text = made.page
     assert f"rigdda {' '.join(DESIGN)} --out decision" in text
     assert f"rigdda {' '.join(SIMULATE)} --out before" in text
-    assert mechanics() in text and f">{rigdda.__version__}<" in text
+    assert MECHANICS in text and f">{rigdda.__version__}<" in text
     assert "damping_when = &#34;contact&#34;" in text  # a default in the site as used
 
 
@@ -281,7 +280,7 @@ def test_a_record_says_what_made_a_folder(made: Made) -> None:
     record = read(made.folder / "decision")["design"]
     assert record.arguments == [*DESIGN, "--out", "decision"]
     assert record.options["seed"] == 0 and record.options["designer"] == "race"
-    assert record.started <= record.ended and record.mechanics == mechanics()
+    assert record.started <= record.ended and record.versions.mechanics == MECHANICS
     assert Site.parse(record.site, "record") == Site.load(made.folder / "chute.toml")
     assert {"layouts.csv", "layout.toml", "section.png", "episode.rrd"} <= set(record.files)
     assert record.findings and all(line in made.printed for line in record.findings)

@@ -99,14 +99,14 @@ def test_a_command_repeats_an_episode_and_tells_what_differs(tmp_path: Path) -> 
 
     record = replay_record.load(path)
     wrong = float(np.nextafter(reward, 1.0))
-    versions = msgspec.structs.replace(record.versions, kernels="0" * 16)
+    versions = msgspec.structs.replace(record.versions, mechanics="0ld")
     other = msgspec.structs.replace(record, rewards=[wrong], versions=versions)
     run, _ = rigdda.release(CUT, (), 0)
     run.to_rerun(tmp_path / "other.rrd", Marks(record=as_json(other)))
     code, out, err = command(tmp_path / "other.rrd")
     assert code == 1
     assert f"results differ: recorded reward {wrong!r}, computed reward {reward!r}" in err
-    assert f"version differs: kernels {'0' * 16}, now {record.versions.kernels}" in out
+    assert f"version differs: mechanics 0ld, now {record.versions.mechanics}" in out
 
 
 @pytest.mark.parametrize("event", [None, "block"])

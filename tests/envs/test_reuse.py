@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 import rigdda
-from rigdda import Ditch, Embankment, Fence, GravityWall, Layout, Outcome, Site
+from rigdda import Ditch, Embankment, Fence, Forest, GravityWall, Layout, Outcome, Site
 from rigdda.envs import outcome_cache
 from rigdda.envs.outcome_cache import Memory, Sample, release_key
 from rigdda.model.barrier_zone import BarrierZone
@@ -144,6 +144,7 @@ MOTION: dict[str, Callable[[Site], object]] = {
     "surfaces": lambda s: s.surfaces | {"soil": Surface(31.0)},
     "interfaces": lambda s: (Interface("rock", "soil", 31.0),),
     "motion": lambda s: msgspec.structs.replace(s.motion, duration=7.0),
+    "forest": lambda s: (Forest(1.0, 9.0, stems=100.0, dbh=0.3),),
     "scatter": lambda s: msgspec.structs.replace(s.scatter, friction_deg=1.0),
 }
 

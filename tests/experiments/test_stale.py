@@ -1,16 +1,18 @@
-"""Results that other kernels made are listed."""
+"""Results that other mechanics made are listed."""
 
 from __future__ import annotations
 
+import pytest
 from click.testing import CliRunner
 
 from experiments import script, stale
-from rigdda.kernel import kernel_statements
+from rigdda import MECHANICS
+from rigdda.envs import site_store
 
 
-def test_what_other_kernels_made_is_listed(tmp_path, monkeypatch):
+def test_what_other_mechanics_made_is_listed(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr(script, "kernels_hash", lambda: "0ld")
+        patch.setattr(script, "MECHANICS", "0ld")
         script.write(tmp_path / "old.csv", [{"a": 1.0}])
     script.write(tmp_path / "new.csv", [{"a": 1.0}])
     (tmp_path / "bench").mkdir()
@@ -18,7 +20,7 @@ def test_what_other_kernels_made_is_listed(tmp_path, monkeypatch):
     told = CliRunner().invoke(stale.main, ["--out", str(tmp_path)])
     assert told.exit_code == 1
     assert [line.split(": ")[1] for line in told.output.splitlines()] == [
-        "made by unknown kernels",
+        "made by unknown mechanics",
         "0ld",
     ]
     for name in ("old.csv", "bench/unknown.csv"):
@@ -27,9 +29,19 @@ def test_what_other_kernels_made_is_listed(tmp_path, monkeypatch):
     assert told.exit_code == 0 and not told.output
 
 
-def test_comments_and_the_module_of_a_kernel_do_not_count():
-    one = b"import math\n\nA = 1  # why\n@kernel\ndef f(x):\n    'Return x.'\n    return A * x\n"
-    two = b"A = 1\n@kernel\ndef f(x):\n    return A * x\n"
-    assert kernel_statements(one) == kernel_statements(two)
-    assert kernel_statements(one) != kernel_statements(two.replace(b"1", b"2"))
-    assert not kernel_statements(b"B = 3\ndef call():\n    return f(B)\n")
+@pytest.mark.parametrize(
+    ("mechanics", "form", "listed"),
+    [
+        (MECHANICS, site_store.FORMAT, False),
+        ("0ld", site_store.FORMAT, True),
+        (MECHANICS, site_store.FORMAT + 1, True),
+    ],
+)
+def test_statistics_of_sites_are_listed(mechanics, form, listed, tmp_path, monkeypatch):
+    monkeypatch.setattr(site_store, "SHIPPED", tmp_path / "shipped.xz")
+    with monkeypatch.context() as patch:
+        patch.setattr(site_store, "MECHANICS", mechanics)
+        patch.setattr(site_store, "FORMAT", form)
+        site_store.SHIPPED.write_bytes(site_store.pack({}))
+    found = [what for what, _ in stale.stale_package() if "statistics" in what]
+    assert bool(found) is listed

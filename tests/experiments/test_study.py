@@ -12,7 +12,7 @@ import pytest
 from experiments import study
 from experiments.made_by import made_by
 from experiments.study import tabulate
-from rigdda.kernel import kernels_hash
+from rigdda import MECHANICS
 
 CASES = [{"name": name, "dt": dt} for name in ("a", "b") for dt in (0.1, 0.2)]
 
@@ -48,7 +48,7 @@ def test_the_table_holds_a_row_a_case_in_their_order(tmp_path: Path) -> None:
     assert table(tmp_path / "t.csv")[1] == {
         "name": "a", "dt": "0.2", "double": "0.4", "times": "3", "none": "", "word": "",
     }  # fmt: skip
-    assert made_by(tmp_path) == {"t.csv": kernels_hash()}
+    assert made_by(tmp_path) == {"t.csv": MECHANICS}
     assert not list(tmp_path.glob("*.part*"))
 
 
@@ -70,10 +70,10 @@ def test_what_is_complete_is_computed_anew(tmp_path: Path) -> None:
     assert len(again.asked) == len(CASES)
 
 
-def test_other_kernels_begin_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_mechanics_begin_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(KeyboardInterrupt):
         tabulate(tmp_path / "t.csv", CASES, Measure(stops=3), told)
-    monkeypatch.setattr(study, "kernels_hash", lambda: "other")
+    monkeypatch.setattr(study, "MECHANICS", "other")
     anew = Measure()
     tabulate(tmp_path / "t.csv", CASES, anew, told)
     assert len(anew.asked) == len(CASES)

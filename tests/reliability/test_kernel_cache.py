@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from rigdda import kernel
+from rigdda import kernel, numba_internals
 from rigdda.errors import Error
 
 SOURCE = """
@@ -77,7 +77,7 @@ def test_only_entry_kernels_become_machine_code(double):
     entry = double()
     assert entry(3.0) == 6.0 and hits(entry) == 0
     inner = entry.py_func.__globals__["twice"].overloads
-    assert [type(part.library) for part in inner.values()] == [kernel.LinkedLibrary]
+    assert [type(part.library) for part in inner.values()] == [numba_internals.LinkedLibrary]
     again = double()
     assert again(3.0) == 6.0 and hits(again) == 1
 
@@ -230,7 +230,7 @@ def test_kernels_that_cannot_be_kept_are_compiled_all_the_same(places, double, m
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(kernel.CheckedFile, "save", full)
+    monkeypatch.setattr(numba_internals.CheckedFile, "save", full)
     with pytest.warns(RuntimeWarning, match="No space left on device"):
         assert entry(3.0) == 6.0
 

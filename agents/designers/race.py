@@ -120,9 +120,7 @@ def final(
     return track.contest(finalists, budget, first, STEP, "final", contenders)
 
 
-def state_of_final(
-    surrogate: Surrogate, arms: Sequence[Arm], nothing: Arm
-) -> tuple[Floats, float]:
+def state_of_final(surrogate: Surrogate, arms: Sequence[Arm], nothing: Arm) -> tuple[Floats, float]:
     """Return Z of the arms of a final, and what another `STEP` releases are expected to gain.
 
     Z is over the risk without barriers, and the gain is relative to the least Z [-]. The releases

@@ -179,8 +179,7 @@ class Surrogate:
     @property
     def has_targets(self) -> bool:
         """Whether the problem has a target."""
-        t = self.problem.targets
-        return any(v is not None for v in (t.reach, t.failure, t.individual))
+        return self.problem.targets.given
 
     def value(self, price: float = 0.0) -> Floats:
         """Return Z of every layout over the risk without barriers, (M,) [-].

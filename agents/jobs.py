@@ -202,24 +202,14 @@ def study(
     store = Store(out / "evaluations.jsonl", outcomes=True)
     tick(0, "simulating releases without barriers")
     precision = 0.0 if problem.targets.given else precision
-    front: tuple[TriedLayout, ...] = ()
-    replaced = False
     free = problem.with_checks("reported")  # in which all layouts can be compared
-    verification = Verification(free, releases, seed, store)
+    verification, rule = Verification(free, releases, seed, store), answer(free)
+    begun, known = search_budget(problem, name, simulations), _unsearched(free, name, rule)
     with EvaluationsFile(out / "evaluations.csv", problem.site) as file:
-        rule = answer(free)
-        known = _unsearched(free, name, rule)
-        interim = InterimAnswer(verification, tell)
-        interim.begin(known)
 
         def progress(entry: Entry) -> None:
             file.add(entry)
             tick(entry.simulations, f"{name}: {entry.stage}")
-
-        result, unchecked = _searched(
-            problem, name, simulations, seed, progress, store, precision, interim
-        )
-        begun = search_budget(problem, name, simulations)
 
         def check(layout: Layout, stage: str) -> Evaluation:
             if stage == "frontier":
@@ -229,30 +219,53 @@ def study(
             file.add(Entry(result.simulations, stage, evaluation))
             return evaluation
 
+        interim = InterimAnswer(verification, tell)
+        interim.begin(known)
+        result, unchecked = _searched(
+            problem, name, simulations, seed, progress, store, precision, interim
+        )
         layouts = [*known, *_found(name, result, rule, unchecked)]
         cases = _verified(verification, layouts, precision, begun, tick, tell)
         for case in cases:
             file.add(Entry(result.simulations, "verification", case.evaluation))
+        front: tuple[TriedLayout, ...] = ()
+        replaced = False
+        done = begun + releases * len(cases)
         if cases[-1].evaluation.targets == MISSED and design_events(problem.site):
-            tick(begun + releases * len(cases), "verifying the frontier")
+            tick(done, "verifying the frontier")
             searched = name not in SEARCHLESS
             result, front, replaced = with_frontier(problem, result, cases, check, searched)
-    tick(begun + releases * len(cases), "analysing the remaining risk, checking barriers")
-    layouts = [(case.name, case.evaluation.layout) for case in cases]
-    archive.write(out / archive.FILE, archive.archive(problem, seed, layouts, store))
-    others = layouts[:-1] if problem.checks == "required" else []
+    tick(done, "analysing the remaining risk, checking barriers")
+    named = [(case.name, case.evaluation.layout) for case in cases]
+    archive.write(out / archive.FILE, archive.archive(problem, seed, named, store))
+    found = _concluded(problem, cases, result, rule, verification, seed)
+    return replace(found, frontier=front, replaced=replaced), store
+
+
+def _concluded(
+    problem: DesignProblem,
+    cases: Sequence[VerifiedLayout],
+    result: DesignResult,
+    rule: RuleAnswer,
+    verification: Verification,
+    seed: int,
+) -> DesignStudy:
+    """Return the study of verified layouts with their checks and the risk that remains."""
+    free, chosen = verification.problem, cases[-1].evaluation.layout
+    others = cases[:-1] if problem.checks == "required" else ()
     done = DesignStudy(
         problem=problem,
         cases=tuple(cases),
         result=result,
         left=_left(free, [case.evaluation for case in cases], result.tried, seed),
         rule=rule,
-        checks=check_layout(free, cases[-1].evaluation.layout),
-        frontier=front,
-        replaced=replaced,
-        other_checks={case: check_layout(free, layout) for case, layout in others},
+        checks=check_layout(free, chosen),
+        other_checks={case.name: check_layout(free, case.evaluation.layout) for case in others},
     )
-    return done, store
+    other = done.unchecked
+    if other is None or other.evaluation.releases < 2 * len(problem.site.events):
+        return done
+    return replace(done, compliance=verification.difference(chosen, other.evaluation.layout))
 
 
 def _verified(
@@ -275,13 +288,14 @@ def _verified(
             cases.append(VerifiedLayout(case, verification.evaluate(layout, stage)))
         tell(cases)
         evaluations = [case.evaluation for case in cases]
-        if precision > 0.0 and verification.decided(evaluations, stage, precision):
+        if precision > 0.0 and verification.decided(evaluations, precision):
             break
     return cases
 
 
 SEARCH = 0.5
-"""Precision of a search over that of the verification [-]."""
+"""Precision of the search over that of the verification [-]. The search without required checks, of
+which no layout is built, has that of the verification."""
 
 UNCHECKED = 0.5
 """Budget of the search without required checks over that of the search with them [-]."""
@@ -310,8 +324,9 @@ def _searched(
     barrier may meet them below another one although it would not on its own. The first result has
     the releases of both searches.
     """
-    search = designers.module(name).design
+    search = free_search = designers.module(name).design
     if name in designers.STOPPING:
+        free_search = partial(search, precision=precision)
         search = partial(search, precision=SEARCH * precision)
 
     def first(entry: Entry) -> None:
@@ -327,7 +342,7 @@ def _searched(
         progress(replace(entry, simulations=entry.simulations + result.simulations))
 
     free = problem.with_checks("reported")
-    unchecked: DesignResult | None = search(free, more, seed, go_on, store)
+    unchecked: DesignResult | None = free_search(free, more, seed, go_on, store)
     assert unchecked is not None
     both = result.simulations + unchecked.simulations
     better = final_score(free, unchecked.evaluation) < final_score(free, result.evaluation)

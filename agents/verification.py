@@ -95,33 +95,32 @@ class Verification:
         known = dict(zip(order, found, strict=True))
         return [known[i] for i in places]
 
-    def difference(self, one: Layout, two: Layout, stage: int) -> Difference:
-        """Return the difference in Z between two evaluated layouts on all releases up to a stage.
+    def difference(self, one: Layout, two: Layout) -> Difference:
+        """Return the difference in Z between two layouts on their common releases.
 
         Raises
         ------
         BadInput
-            If an event with a non-zero rate has fewer than two releases.
+            If an event with a non-zero rate has fewer than two of them.
         """
-        n, site = self.stages[stage], self.problem.site
-        outcomes = self._outcomes[one][:n], self._outcomes[two][:n]
+        site, pair = self.problem.site, (self._outcomes[one], self._outcomes[two])
+        n = min(map(len, pair))
         facts = ensemble.of(site, self.problem.key).facts
-        return difference(site, (one, two), outcomes, facts)
+        return difference(site, (one, two), (pair[0][:n], pair[1][:n]), facts)
 
-    def decided(self, evaluations: Sequence[Evaluation], stage: int, precision: float) -> bool:
-        """Return whether a verification may end after a stage.
+    def decided(self, evaluations: Sequence[Evaluation], precision: float) -> bool:
+        """Return whether a verification may end.
 
         It may if Z of the last layout is known to within `precision`, or if its order with every
         other layout is clear: the difference is not zero, or it is smaller than `precision` times
-        Z. The layout must also be shown to cost less or more than the first one by intervals that
-        do not overlap, because this is what a design says first.
+        Z. The intervals of the last layout and the first one must also not overlap, because a
+        design says first whether the layout saves more than it costs.
 
         Parameters
         ----------
         evaluations : sequence of Evaluation
-            Evaluations at this stage, no barrier first and the recommended layout last.
-        stage : int
-            Index of the stage.
+            Evaluations of layouts on all their releases, which are the same for all. No barrier is
+            the first and the recommended layout is the last.
         precision : float
             Half of the width of an interval over Z [-].
         """
@@ -132,21 +131,28 @@ class Verification:
         if last.layout and last.ci[0] <= bare.ci[1] and last.ci[1] >= bare.ci[0]:
             return False
         others = [e.layout for e in evaluations if e.layout != last.layout]
-        return all(self._clear(last.layout, other, stage, exact) for other in others)
+        found = [self.difference(last.layout, other) for other in others]
+        return all(clear(one, exact, len(self.stages)) for one in found)
 
-    def _clear(self, one: Layout, two: Layout, stage: int, exact: float) -> bool:
-        """Return whether two layouts differ in Z, or differ by less than `exact`.
 
-        The interval is widened so that all stages together have the error of one interval.
-        """
-        found = self.difference(one, two, stage)
-        error = (1.0 - CONFIDENCE) / 2.0
-        wider = NormalDist().inv_cdf(1.0 - error / len(self.stages)) / NormalDist().inv_cdf(
-            1.0 - error
-        )
-        low = found.value - wider * (found.value - found.ci[0])
-        high = found.value + wider * (found.ci[1] - found.value)
-        return low > 0.0 or high < 0.0 or max(-low, high) <= exact
+def clear(found: Difference, exact: float, looks: int) -> bool:
+    """Return whether a difference is not zero, or is smaller than `exact`.
+
+    Parameters
+    ----------
+    found : Difference
+        The difference.
+    exact : float
+        Size of a difference that does not matter [EUR per metre and year].
+    looks : int
+        Number of times that the question is asked during a verification. The interval is widened,
+        so that the probability of an error in any of them is that of one interval (Bonferroni).
+    """
+    error = (1.0 - CONFIDENCE) / 2.0
+    normal = NormalDist().inv_cdf
+    wider = normal(1.0 - error / looks) / normal(1.0 - error)
+    low, high = (found.value + wider * (end - found.value) for end in found.ci)
+    return low > 0.0 or high < 0.0 or max(-low, high) <= exact
 
 
 Tell = Callable[[Sequence[VerifiedLayout]], None]

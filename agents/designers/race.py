@@ -144,10 +144,10 @@ def forecast_pool(
 
     `value` is the network for the forecasts, by default the one that ships with the package.
     """
-    problem = ledger.problem
+    problem, singles = ledger.problem, single_barriers(menu)
     forecast = Forecast(problem, ensemble_for(ledger, menu.stations), value or value_network())
-    ledger.starts |= {*known, *single_barriers(menu)}
-    return forecasts_of(forecast, menu, known)
+    ledger.starts |= {*known, *singles}
+    return forecasts_of(forecast, menu, known, singles)
 
 
 def single_barriers(menu: Menu) -> list[Layout]:
@@ -155,10 +155,12 @@ def single_barriers(menu: Menu) -> list[Layout]:
     return [(b,) for kind in menu.problem.kinds for b in menu.singles(kind)]
 
 
-def forecasts_of(forecast: Forecast, menu: Menu, known: Sequence[Layout]) -> Surrogate:
-    """Return forecasts of all single barriers, of pairs of the best and of `known` layouts."""
+def forecasts_of(
+    forecast: Forecast, menu: Menu, known: Sequence[Layout], singles: Sequence[Layout]
+) -> Surrogate:
+    """Return forecasts of `known` layouts, of single barriers and of pairs of the best of them."""
     surrogate = Surrogate(menu.problem, forecast)
-    surrogate.add([*known, *single_barriers(menu)])
+    surrogate.add([*known, *singles])
     best = firsts(surrogate, BEST_OF)
     surrogate.add(joined(menu.problem, best, best))
     return surrogate

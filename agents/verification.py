@@ -8,6 +8,7 @@ part also gives the first answer, before the search has begun.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from statistics import NormalDist
 
 from rigdda import Layout, Outcome
@@ -68,7 +69,7 @@ class Verification:
         self._outcomes: dict[Layout, list[Outcome]] = {}
 
     def evaluate(self, layout: Layout, stage: int = 0) -> Evaluation:
-        """Return the evaluation of a layout on all releases up to a stage.
+        """Return the evaluation of a layout on all releases up to a stage, without outcomes.
 
         Raises
         ------
@@ -80,7 +81,7 @@ class Verification:
         for end in self.stages[: stage + 1]:
             if len(own) < end:
                 own += self._part(layout, len(own), end)
-        return self.problem.judge(layout, own[:n], self._seeds[:n])
+        return replace(self.problem.judge(layout, own[:n], self._seeds[:n]), outcomes=())
 
     def _part(self, layout: Layout, start: int, end: int) -> list[Outcome]:
         """Return the outcomes of some releases, in the order of their seeds."""

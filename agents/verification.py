@@ -113,9 +113,9 @@ class Verification:
         """Return whether a verification may end.
 
         It may if Z of the last layout is known to within `precision`, or if its order with every
-        other layout is clear: the difference is not zero, or it is smaller than `precision` times
-        Z. The intervals of the last layout and the first one must also not overlap, because a
-        design says first whether the layout saves more than it costs.
+        other layout is clear: the other one is cheaper, or not by more than `precision` times Z.
+        The intervals of the last layout and the first one must also not overlap, because a design
+        says first whether the layout saves more than it costs.
 
         Parameters
         ----------
@@ -137,14 +137,14 @@ class Verification:
 
 
 def clear(found: Difference, exact: float, looks: int) -> bool:
-    """Return whether a difference is not zero, or is smaller than `exact`.
+    """Return whether the first layout is dearer, or not dearer by more than `exact`.
 
     Parameters
     ----------
     found : Difference
-        The difference.
+        Z of the first layout minus Z of the second.
     exact : float
-        Size of a difference that does not matter [EUR per metre and year].
+        Loss that does not matter [EUR per metre and year].
     looks : int
         Number of times that the question is asked during a verification. The interval is widened,
         so that the probability of an error in any of them is that of one interval (Bonferroni).
@@ -153,7 +153,7 @@ def clear(found: Difference, exact: float, looks: int) -> bool:
     normal = NormalDist().inv_cdf
     wider = normal(1.0 - error / looks) / normal(1.0 - error)
     low, high = (found.value + wider * (end - found.value) for end in found.ci)
-    return low > 0.0 or high < 0.0 or max(-low, high) <= exact
+    return low > 0.0 or high <= exact
 
 
 Tell = Callable[[Sequence[VerifiedLayout]], None]

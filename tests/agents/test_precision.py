@@ -99,6 +99,7 @@ def test_a_difference_is_clear_or_does_not_matter() -> None:
     assert clear(found(10.0, 9.0), 0.0, 1)
     assert not clear(found(10.0, 9.0), 0.0, 4)  # four questions widen the interval by 1.27
     assert clear(found(1.0, 3.0), 5.0, 4) and not clear(found(3.0, 3.0), 5.0, 4)
+    assert clear(found(-9.0, 10.0), 5.0, 4)  # it may be cheaper by much, but not dearer by much
 
 
 @pytest.fixture

@@ -211,11 +211,10 @@ def explore(
     """
     problem, ledger = track.problem, track.ledger
     end = ledger.left - budget
+    each = min(max(FEWEST, 2 * len(problem.site.events), int(EACH * math.sqrt(budget))), MOST)
     arms: list[Arm] = []
     batches = BATCHES if precision == 0.0 else max(BATCHES, math.ceil(budget / STEP))
     for i in range(batches):
-        spent = budget if precision == 0.0 else (i + 1) * budget // batches
-        each = min(max(FEWEST, 2 * len(problem.site.events), int(EACH * math.sqrt(spent))), MOST)
         count = (ledger.left - end) // (each * (batches - i)) - 1
         if count < 1:
             break

@@ -294,7 +294,8 @@ def _verified(
 
 
 SEARCH = 0.5
-"""Precision of a search over that of the verification [-]."""
+"""Precision of the search over that of the verification [-]. The search without required checks, of
+which nothing is built, has that of the verification."""
 
 UNCHECKED = 0.5
 """Budget of the search without required checks over that of the search with them [-]."""
@@ -323,8 +324,9 @@ def _searched(
     barrier may meet them below another one although it would not on its own. The first result has
     the releases of both searches.
     """
-    search = designers.module(name).design
+    search = free_search = designers.module(name).design
     if name in designers.STOPPING:
+        free_search = partial(search, precision=precision)
         search = partial(search, precision=SEARCH * precision)
 
     def first(entry: Entry) -> None:
@@ -340,7 +342,7 @@ def _searched(
         progress(replace(entry, simulations=entry.simulations + result.simulations))
 
     free = problem.with_checks("reported")
-    unchecked: DesignResult | None = search(free, more, seed, go_on, store)
+    unchecked: DesignResult | None = free_search(free, more, seed, go_on, store)
     assert unchecked is not None
     both = result.simulations + unchecked.simulations
     better = final_score(free, unchecked.evaluation) < final_score(free, result.evaluation)

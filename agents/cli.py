@@ -495,9 +495,10 @@ def design(
 
     SITE is the name of a built-in site or a TOML file. The layout is verified on releases that the
     search did not use. The best layout has the least cost Z of those whose barriers meet their
-    checks; a second search with at most half of the budget shows what this condition costs. Z is the
-    sum of capital and upkeep, expected harm on the road and expected repair, in EUR per metre of road and
-    year. At the end, the layouts are compared on other grounds within the plausible range.
+    checks; a second search with at most half of the budget shows what this condition costs. Z is
+    the sum of capital and upkeep, expected harm on the road and expected repair, in EUR per metre
+    of road and year. At the end, the layouts are compared on other grounds within the plausible
+    range.
 
     A first answer appears within seconds and improves during the search. The search and the
     verification stop when more releases would hardly change the answer (--precision).

@@ -29,6 +29,7 @@ from rigdda.agents.terminal import (
     fail,
     finding,
     folder_for,
+    interim,
     layout_option,
     note,
     once,
@@ -409,11 +410,14 @@ def repeat(file: Path) -> None:
 
 
 BUDGET = 20_000
-"""Default budget of a search; it takes about a minute for a built-in site on two cores."""
+"""Default limit of the releases of a search."""
 
 RELEASES = 3_000
-"""Default number of releases for the verification of a layout; Z is then known to a few per
-cent."""
+"""Default limit of the releases for the verification of a layout; with all of them, Z is known to a
+few per cent."""
+
+PRECISION = 0.02
+"""Default precision of a design relative to Z [-]."""
 
 CASES = 5
 """Greatest number of layouts that are verified: no barrier, the rule, the constant, the layout
@@ -454,9 +458,14 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @click.option("--zone", type=RealNumber(), nargs=2, metavar="A B",
               help="Place barriers between the chainages A and B [m], as in the site file, not of "
               "its survey.  [default: the zone of the site]")  # fmt: skip
-@count_option("--budget", 2, BUDGET, "Number of releases that the search may simulate.")
+@click.option("--precision", type=RealNumber(0.0, 0.5), default=PRECISION, show_default=True,
+              metavar="P", help="Precision of the answer relative to Z. The verification ends when "
+              "the order of the layouts is clear or Z is known to within P, the search when "
+              "another 1,000 releases are expected to lower Z by less than P/2. 0 uses all "
+              "releases of --budget and --verify, as a target does.")  # fmt: skip
+@count_option("--budget", 2, BUDGET, "Largest number of releases of the search.")
 @checks_option
-@count_option("--verify", 10, RELEASES, "Number of new releases for verifying each layout.")
+@count_option("--verify", 10, RELEASES, "Largest number of new releases for verifying each layout.")
 @click.option("--ground-samples", "grounds", type=WholeNumber(0, 1000), default=6,
               show_default=True, help="Number of grounds within the plausible range on which the "
               "layouts are compared at the end; 0 for none.")  # fmt: skip
@@ -473,6 +482,7 @@ def design(
     target_risk: float | None,
     max_cost: float | None,
     zone: tuple[float, float] | None,
+    precision: float,
     budget: int,
     checks: str,
     verify: int,
@@ -485,9 +495,13 @@ def design(
 
     SITE is the name of a built-in site or a TOML file. The layout is verified on releases that the
     search did not use. The best layout has the least cost Z of those whose barriers meet their
-    checks; a second search with half of the budget shows what this condition costs. Z is the sum of
-    capital and upkeep, expected harm on the road and expected repair, in EUR per metre of road and
-    year. At the end, the layouts are compared on other grounds within the plausible range.
+    checks; a second search with at most half of the budget shows what this condition costs. Z is
+    the sum of capital and upkeep, expected harm on the road and expected repair, in EUR per metre
+    of road and year. At the end, the layouts are compared on other grounds within the plausible
+    range.
+
+    A first answer appears within seconds and improves during the search. The search and the
+    verification stop when more releases would hardly change the answer (--precision).
 
     If the layout misses a target, the cheapest layout for each level of P(reach) is reported and
     written to frontier.csv and frontier.png.
@@ -504,7 +518,7 @@ def design(
     from rigdda.agents import ground_band, jobs
     from rigdda.agents.designers.store import FILE, record_problem
     from rigdda.agents.parameters import read_posterior
-    from rigdda.agents.reports import band_report
+    from rigdda.agents.reports import band_report, interim_answer
     from rigdda.agents.reports.folder import FILES, write
 
     problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone, checks)
@@ -514,8 +528,11 @@ def design(
     band = None
     with recorded_run(folder, problem.site):
         total = jobs.search_budget(problem, designer, budget) + CASES * verify
-        with progress(total) as tick:
-            done, store = jobs.study(problem, designer, budget, seed, verify, folder, tick)
+        with interim(total) as (tick, show_interim):
+            done, store = jobs.study(
+                problem, designer, budget, seed, verify, folder, tick, precision,
+                lambda cases: show_interim(interim_answer.line(cases), interim_answer.table(cases)),
+            )  # fmt: skip
             tick(total, "pictures")
             write(done, folder, seed)
         if grounds:
@@ -523,7 +540,7 @@ def design(
                 band = ground_band.assess(done, grounds, fitted, seed, folder, tick)
             band_report.write(folder, band)
             ground_band.forget(folder)
-    _tell(done, store, verify, folder)
+    _tell(done, store, folder)
     if band is not None:
         click.echo(
             f"on {len(band.samples)} other grounds ({band.source}), {band.releases} releases of "
@@ -568,7 +585,7 @@ def _pose(
     return DesignProblem(released(site), **asked)
 
 
-def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
+def _tell(done: DesignStudy, store: Store, folder: Path) -> None:
     """Print the tables, the layout to order, its limits and the computing effort."""
     from rigdda.agents.reports import checks, findings, frontier_report, headline, tables
     from rigdda.agents.reports.folder import FILES
@@ -612,7 +629,7 @@ def _tell(done: DesignStudy, store: Store, verify: int, folder: Path) -> None:
     files += [tables.RISKS] if site.traffic is not None else []
     click.echo(
         f"search: {result.simulations:,} releases, {result.seconds:.0f} s of processor time; "
-        f"verification: {verify:,} new releases of each layout{resumed}\n"
+        f"verification: {chosen.releases:,} new releases of each layout{resumed}\n"
         f"{', '.join(files)} are in {folder}"
     )
 

@@ -10,6 +10,7 @@ from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import DesignResult
 from rigdda.agents.designers.rule import RuleAnswer
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.comparison import Difference
 
 NOTHING, CONSTANT, SHED = "nothing", "constant", "rock shed"
 
@@ -86,6 +87,9 @@ class DesignStudy(ComparedLayouts):
         Whether the layout found is one of the frontier, which is better than that of the designer.
     other_checks : dict of str to LayoutChecks
         If checks are required: the checks of the other cases, by their names.
+    compliance : Difference, optional
+        If checks are required and a layout was found without them: Z of the layout found minus Z
+        of this layout, on the same releases.
     """
 
     result: DesignResult
@@ -95,6 +99,7 @@ class DesignStudy(ComparedLayouts):
     frontier: tuple[TriedLayout, ...] = ()
     replaced: bool = False
     other_checks: dict[str, LayoutChecks] = field(default_factory=dict)
+    compliance: Difference | None = None
 
     @property
     def comparable(self) -> tuple[VerifiedLayout, ...]:

@@ -7,7 +7,7 @@ import shutil
 import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,6 +44,7 @@ from rigdda.agents.designers.rule import RuleAnswer, answer
 from rigdda.agents.designers.store import Store
 from rigdda.agents.reports import findings
 from rigdda.agents.reports.tables import EvaluationsFile
+from rigdda.agents.verification import InterimAnswer, Tell, Verification
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.envelope import largest
 from rigdda.envs.outcome_cache import fingerprint
@@ -159,8 +160,10 @@ def study(
     releases: int,
     out: Path,
     tick: Tick,
+    precision: float = 0.0,
+    tell: Tell = lambda _: None,
 ) -> tuple[DesignStudy, Store]:
-    """Design a layout, then verify it and the layouts for comparison on `releases` new releases.
+    """Design a layout, then verify it and the layouts for comparison on new releases.
 
     If the layout misses a target, the layouts of the frontier are verified as well, see
     `with_verified_frontier`, and the best of all verified layouts is taken. The releases of this
@@ -170,6 +173,28 @@ def study(
     and the archive of all outcomes at the end. A study that was interrupted reads the evaluations
     that it needs again from the store.
 
+    Parameters
+    ----------
+    problem : DesignProblem
+        The problem.
+    name : str
+        Name of the designer.
+    simulations, releases : int
+        Largest number of releases of the search, and of the verification of each layout.
+    seed : int
+        Seed of the search.
+    out : path
+        Folder of the results.
+    tick : callable
+        Called with the number of releases so far and a description.
+    precision : float
+        Precision of the answer relative to Z [-]. The verification ends when the order of the
+        layouts is clear or Z is known to within it, and the search of a designer in
+        `designers.STOPPING` when it gains less than `SEARCH` times it. With 0, or if the problem
+        has targets, all releases are used.
+    tell : callable
+        Called with the layouts that are known so far, the best one last, first within seconds.
+
     Raises
     ------
     BadInput, Diverged
@@ -177,9 +202,10 @@ def study(
     """
     store = Store(out / "evaluations.jsonl", outcomes=True)
     tick(0, "simulating releases without barriers")
-    front: tuple[TriedLayout, ...] = ()
-    replaced = False
+    precision = 0.0 if problem.targets.given else precision
     free = problem.with_checks("reported")  # in which all layouts can be compared
+    verification, rule = Verification(free, releases, seed, store), answer(free)
+    begun, known = search_budget(problem, name, simulations), _unsearched(free, name, rule)
     with EvaluationsFile(out / "evaluations.csv", problem.site) as file:
 
         def progress(entry: Entry) -> None:
@@ -187,38 +213,90 @@ def study(
             tick(entry.simulations, f"{name}: {entry.stage}")
 
         def check(layout: Layout, stage: str) -> Evaluation:
-            stream = CHOICE if stage == "frontier" else stage
-            evaluation = verify(free, layout, releases, seed, store, stream)
+            if stage == "frontier":
+                evaluation = verify(free, layout, releases, seed, store, CHOICE)
+            else:
+                evaluation = verification.evaluate(layout, len(verification.stages) - 1)
             file.add(Entry(result.simulations, stage, evaluation))
             return evaluation
 
-        result, unchecked = _searched(problem, name, simulations, seed, progress, store)
-        begun, rule = search_budget(problem, name, simulations), answer(free)
-        cases: list[VerifiedLayout] = []
-        for case, layout in _compared(free, name, result, rule, unchecked):
-            tick(begun + releases * len(cases), f"verifying: {case}")
-            cases.append(VerifiedLayout(case, check(layout, "verification")))
+        interim = InterimAnswer(verification, tell)
+        interim.begin(known)
+        result, unchecked = _searched(
+            problem, name, simulations, seed, progress, store, precision, interim
+        )
+        layouts = [*known, *_found(name, result, rule, unchecked)]
+        cases = _verified(verification, layouts, precision, begun, tick, tell)
+        for case in cases:
+            file.add(Entry(result.simulations, "verification", case.evaluation))
+        front: tuple[TriedLayout, ...] = ()
+        replaced = False
+        done = begun + releases * len(cases)
         if cases[-1].evaluation.targets == MISSED and design_events(problem.site):
-            tick(begun + releases * len(cases), "verifying the frontier")
+            tick(done, "verifying the frontier")
             searched = name not in SEARCHLESS
             result, front, replaced = with_frontier(problem, result, cases, check, searched)
-    tick(begun + releases * len(cases), "analysing the remaining risk, checking barriers")
-    layouts = [(case.name, case.evaluation.layout) for case in cases]
-    archive.write(out / archive.FILE, archive.archive(problem, seed, layouts, store))
-    others = layouts[:-1] if problem.checks == "required" else []
+    tick(done, "analysing the remaining risk, checking barriers")
+    named = [(case.name, case.evaluation.layout) for case in cases]
+    archive.write(out / archive.FILE, archive.archive(problem, seed, named, store))
+    found = _concluded(problem, cases, result, rule, verification, seed)
+    return replace(found, frontier=front, replaced=replaced), store
+
+
+def _concluded(
+    problem: DesignProblem,
+    cases: Sequence[VerifiedLayout],
+    result: DesignResult,
+    rule: RuleAnswer,
+    verification: Verification,
+    seed: int,
+) -> DesignStudy:
+    """Return the study of verified layouts with their checks and the risk that remains."""
+    free, chosen = verification.problem, cases[-1].evaluation.layout
+    others = cases[:-1] if problem.checks == "required" else ()
     done = DesignStudy(
         problem=problem,
         cases=tuple(cases),
         result=result,
         left=_left(free, [case.evaluation for case in cases], result.tried, seed),
         rule=rule,
-        checks=check_layout(free, cases[-1].evaluation.layout),
-        frontier=front,
-        replaced=replaced,
-        other_checks={case: check_layout(free, layout) for case, layout in others},
+        checks=check_layout(free, chosen),
+        other_checks={case.name: check_layout(free, case.evaluation.layout) for case in others},
     )
-    return done, store
+    other = done.unchecked
+    if other is None or other.evaluation.releases < 2 * len(problem.site.events):
+        return done
+    return replace(done, compliance=verification.difference(chosen, other.evaluation.layout))
 
+
+def _verified(
+    verification: Verification,
+    layouts: Sequence[tuple[str, Layout]],
+    precision: float,
+    begun: int,
+    tick: Tick,
+    tell: Tell,
+) -> list[VerifiedLayout]:
+    """Return layouts that are verified on the same releases, as many as the precision needs.
+
+    `begun` is the number of releases before the verification, for the display of progress.
+    """
+    cases: list[VerifiedLayout] = []
+    for stage, n in enumerate(verification.stages):
+        cases = []
+        for i, (case, layout) in enumerate(layouts):
+            tick(begun + i * n, f"verifying: {case}")
+            cases.append(VerifiedLayout(case, verification.evaluate(layout, stage)))
+        tell(cases)
+        evaluations = [case.evaluation for case in cases]
+        if precision > 0.0 and verification.decided(evaluations, precision):
+            break
+    return cases
+
+
+SEARCH = 0.5
+"""Precision of the search over that of the verification [-]. The search without required checks, of
+which nothing is built, has that of the verification."""
 
 UNCHECKED = 0.5
 """Budget of the search without required checks over that of the search with them [-]."""
@@ -238,6 +316,8 @@ def _searched(
     seed: int,
     progress: Progress,
     store: Store,
+    precision: float,
+    interim: InterimAnswer,
 ) -> tuple[DesignResult, DesignResult | None]:
     """Return the results of a designer with and, if checks are required, without this condition.
 
@@ -245,17 +325,25 @@ def _searched(
     barrier may meet them below another one although it would not on its own. The first result has
     the releases of both searches.
     """
-    search = designers.module(name).design
-    result = search(problem, simulations, seed, progress, store)
+    search = free_search = designers.module(name).design
+    if name in designers.STOPPING:
+        free_search = partial(search, precision=precision)
+        search = partial(search, precision=SEARCH * precision)
+
+    def first(entry: Entry) -> None:
+        progress(entry)
+        interim.consider(entry)
+
+    result = search(problem, simulations, seed, first, store)
     more = search_budget(problem, name, simulations) - simulations
     if more == 0:
         return result, None
 
     def go_on(entry: Entry) -> None:
-        progress(replace(entry, simulations=entry.simulations + simulations))
+        progress(replace(entry, simulations=entry.simulations + result.simulations))
 
     free = problem.with_checks("reported")
-    unchecked: DesignResult | None = search(free, more, seed, go_on, store)
+    unchecked: DesignResult | None = free_search(free, more, seed, go_on, store)
     assert unchecked is not None
     both = result.simulations + unchecked.simulations
     better = final_score(free, unchecked.evaluation) < final_score(free, result.evaluation)
@@ -373,24 +461,31 @@ def _with_layout(
     )
 
 
-def _compared(
-    problem: DesignProblem,
-    name: str,
-    result: DesignResult,
-    rule: RuleAnswer,
-    unchecked: DesignResult | None,
-) -> list[tuple[str, Layout]]:
-    """Return the layouts to verify: no barrier, the rule, the constant and the designer's."""
+def _unsearched(
+    problem: DesignProblem, name: str, rule: RuleAnswer
+) -> tuple[tuple[str, Layout], ...]:
+    """Return the layouts for comparison that need no search: no barrier, the rule, the constant.
+
+    The layout of the designer `name` is left out.
+    """
     bare = AS_IT_STANDS if problem.site.existing else NOTHING
     out: list[tuple[str, Layout]] = [(bare, ())]
     if name != "rule":
         out.append((rule.name, rule.layout))
     if name != CONSTANT:
         out.append((CONSTANT, constant(problem, Menu(problem))))
-    if unchecked is not None and unchecked.layout != result.layout:
-        out.append((WITHOUT_CHECKS, unchecked.layout))
+    return tuple(out)
+
+
+def _found(
+    name: str, result: DesignResult, rule: RuleAnswer, unchecked: DesignResult | None
+) -> list[tuple[str, Layout]]:
+    """Return the layout that was found without required checks, if it differs, and the result."""
     words = {"rule": rule.name, CONSTANT: CONSTANT}.get(name, f"optimised ({name})")
-    return [*out, (words, result.layout)]
+    found = [(words, result.layout)]
+    if unchecked is not None and unchecked.layout != result.layout:
+        found.insert(0, (WITHOUT_CHECKS, unchecked.layout))
+    return found
 
 
 def _left(

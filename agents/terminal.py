@@ -376,39 +376,69 @@ def _stamps(folder: Path) -> set[Stamp]:
     return {(name, (s.st_ino, s.st_size, s.st_mtime_ns)) for name, s in found}
 
 
+Tick = Callable[[int, str], None]
+"""Reports the number of releases or steps that are done, and what is being done."""
+
+
 @contextmanager
-def progress(total: int) -> Iterator[Callable[[int, str], None]]:
+def progress(total: int) -> Iterator[Tick]:
     """Yield a function that reports the progress of a job on standard error.
 
     On a terminal it is a progress bar, otherwise an occasional line. The words may contain names
     that a user gave; they are shown as they are.
     """
+    with interim(total) as (tick, _):
+        yield tick
+
+
+@contextmanager
+def interim(total: int) -> Iterator[tuple[Tick, Callable[[str, RenderableType], None]]]:
+    """Yield the function of `progress` and one that shows an answer which is to improve.
+
+    It takes the answer as one line and as a table. On a terminal the table stands above the
+    progress bar until the next one replaces it. Otherwise the line is written, the first one at
+    once and later ones at most every `PAUSE` seconds. Both are on standard error.
+    """
+    from rich.console import Group
+    from rich.live import Live
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
     from rich.progress import TimeRemainingColumn as Remaining
 
     console = _console(stderr=True)
     if not console.is_terminal:
-        yield _lines(total)
+        rarely = _rarely(-PAUSE)
+        yield _lines(total), lambda line, _: rarely(" ".join(line.split()))
         return
     words = TextColumn("{task.description}", markup=False)  # the column has markup of its own
-    with Progress(
-        words, BarColumn(), MofNCompleteColumn(), Remaining(), console=console, transient=True
-    ) as bar:
-        task = bar.add_task("starting", total=total)
-        yield lambda done, words: bar.update(
-            task, completed=done, description=" ".join(words.split())
+    bar = Progress(words, BarColumn(), MofNCompleteColumn(), Remaining(), console=console)
+    task = bar.add_task("starting", total=total)
+    with Live(bar, console=console, transient=True) as live:
+        yield (
+            lambda done, words: bar.update(
+                task, completed=done, description=" ".join(words.split())
+            ),
+            lambda _, table: live.update(Group(table, bar)),
         )
 
 
-def _lines(total: int) -> Callable[[int, str], None]:
+def _lines(total: int) -> Tick:
     """Return a function that writes at most one progress line every `PAUSE` seconds."""
-    told = time.monotonic()
+    rarely = _rarely(0.0)
+    return lambda done, words: rarely(f"{words}: {done:,} of {total:,}")
 
-    def tell(done: int, words: str) -> None:
+
+def _rarely(last: float) -> Callable[[str], None]:
+    """Return a function that writes at most one line every `PAUSE` seconds, the last at `last`.
+
+    `last` is relative to now [s].
+    """
+    told = time.monotonic() + last
+
+    def tell(line: str) -> None:
         nonlocal told
         if time.monotonic() - told >= PAUSE:
             told = time.monotonic()
-            click.echo(f"{words}: {done:,} of {total:,}", err=True)
+            click.echo(line, err=True)
 
     return tell
 

@@ -68,6 +68,11 @@ class Targets:
                 number = check.number(f"targets.{name}", value, 0.0, 1.0, open_low=True)
                 object.__setattr__(self, name, number)
 
+    @property
+    def given(self) -> bool:
+        """Whether there is any target."""
+        return any(t is not None for t in (self.reach, self.failure, self.individual))
+
     def state(
         self,
         events: Iterable[str],

@@ -79,6 +79,7 @@ SLOW = {
     "docs/howto/exam.md",
     "docs/howto/fit.md",
     "docs/howto/long_study.md",
+    "docs/howto/precision.md",
     "docs/howto/report.md",
     "docs/howto/sensitivity.md",
     "docs/howto/stations.md",

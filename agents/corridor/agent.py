@@ -27,7 +27,7 @@ from rigdda.agents.designers.catalogue import ensemble
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.forecast import Forecast, forecast_seeds, value_network
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.race import forecasts_of
+from rigdda.agents.designers.race import forecasts_of, single_barriers
 from rigdda.agents.policy import Network
 from rigdda.envs import DesignProblem
 from rigdda.envs.corridor_environment import CorridorDesign
@@ -76,7 +76,7 @@ def offer(problem: DesignProblem) -> Offer:
     menu, site = Menu(problem), problem.site
     crossings = ensemble(site, forecast_seeds(site), menu.stations)
     forecast = Forecast(problem, crossings, value_network())
-    pool = forecasts_of(forecast, menu, [constant(problem, menu)])
+    pool = forecasts_of(forecast, menu, [constant(problem, menu)], single_barriers(menu))
     layouts: list[Layout] = [()]
     costs, gains = [0.0], [0.0]
     capital, value = pool.capital - site.capital(()), pool.value()

@@ -16,6 +16,9 @@ DEFAULT = "race"
 
 DESIGNERS = ("cma", "constant", "convex", "pareto", "ppo", "race", "random", "rule", "tpe", "value")
 
+STOPPING = ("race",)
+"""Designers whose `design` takes a `precision` and stops when the search gains less than that."""
+
 
 def module(name: str) -> ModuleType:
     """Return the module of a designer.

@@ -64,8 +64,19 @@ def release_seeds(stream: str, seed: int, n: int, start: int = 0) -> tuple[int, 
     tag = STREAMS.index(check.one_of("stream", stream, STREAMS))
     entropy = [check.integer("seed", seed, 0), tag]
     count = check.integer("releases", n, 0, RELEASES)
-    words = np.random.SeedSequence(entropy).generate_state(start + count)[start:]
-    return tuple(int(word) * len(STREAMS) + tag for word in words)
+    words = _distinct(np.random.SeedSequence(entropy), start + count)[start:]
+    return tuple(word * len(STREAMS) + tag for word in words)
+
+
+def _distinct(sequence: np.random.SeedSequence, n: int) -> list[int]:
+    """Return the first `n` different words of a sequence.
+
+    Among 20,000 words of 32 bits, two are often equal.
+    """
+    drawn = n
+    while len(words := dict.fromkeys(sequence.generate_state(drawn).tolist())) < n:
+        drawn += n - len(words)
+    return list(words)
 
 
 MISSED = 1e6

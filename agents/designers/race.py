@@ -10,6 +10,10 @@ another barrier join the pool.
 The best layouts, the rule, the constant and no barrier race on separate releases
 (`rigdda.agents.designers.racing`). The chosen layout is evaluated on further releases that did not
 affect the choice, so that its evaluation is unbiased.
+
+With a `precision`, the search stops before its budget is used up if another `STEP` releases are
+expected to lower Z by less than this share of it. The expectation is that of the Gaussian process
+over all results that the releases may have (knowledge gradient).
 """
 
 from __future__ import annotations
@@ -18,15 +22,17 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 
-from rigdda import Layout
+import numpy as np
+
+from rigdda import Layout, check
 from rigdda.agents.designers.catalogue import ensemble_for
 from rigdda.agents.designers.convex import offered, unsearched
 from rigdda.agents.designers.forecast import Forecast, Value, value_network
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, search
-from rigdda.agents.designers.racing import Arm, Track, best_of_ends
+from rigdda.agents.designers.racing import KEPT, Arm, Floats, Track, best_of_ends
 from rigdda.agents.designers.store import Store
-from rigdda.agents.designers.surrogate import Surrogate
+from rigdda.agents.designers.surrogate import COMMON, Surrogate, expected_gain
 from rigdda.envs import DesignProblem
 
 EXPLORE, FINAL = 0.55, 0.28
@@ -44,6 +50,10 @@ BEST_OF = 12
 """Number of single barriers of each kind with which combinations are formed."""
 FINALISTS = 10
 """Largest number of layouts in the final besides no barrier, the rule and the constant."""
+STEP = 1000
+"""Number of releases between two decisions whether the search stops."""
+REPORT = 300
+"""Number of releases for the evaluation of the chosen layout in a search that may stop early."""
 AS_GOOD = 0.005
 """Largest excess of Z over the best, divided by Z without barriers, with which a layout with fewer
 barriers is preferred [-]."""
@@ -55,16 +65,26 @@ def design(
     seed: int = 0,
     progress: Progress | None = None,
     store: Store | None = None,
+    precision: float = 0.0,
 ) -> DesignResult:
     """Return the best layout that is found within the budget.
 
     If the budget is too small for a final, the best of the starting layouts is returned.
+
+    Parameters
+    ----------
+    problem, simulations, seed, progress, store
+        As for every designer, see `rigdda.agents.designers.protocol`.
+    precision : float
+        Gain of another `STEP` releases below which the search stops, relative to Z [-]. With 0, or
+        if the problem has targets, the whole budget is used.
 
     Raises
     ------
     BadInput, Diverged
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
+    check.number("precision", precision, 0.0, 1.0)
     ledger = Ledger(problem, simulations, seed, progress, store)
     if simulations < LEAST:
         return search(ledger, offered(ledger))
@@ -72,14 +92,49 @@ def design(
     known = unsearched(problem, menu)
     surrogate = forecast_pool(ledger, menu, known)
     track.expect = surrogate.expect
-    explore(track, surrogate, int(EXPLORE * simulations))
-    budget, least = int(FINAL * simulations), 3 * len(problem.site.events)
+    stops = precision if not surrogate.has_targets else 0.0
+    explore(track, surrogate, int(EXPLORE * simulations), precision=stops)
+    ends = final(track, surrogate, known, int(FINAL * simulations), stops)
+    chosen = choose(surrogate, ends, track.seen.get((), track.nothing))
+    report = min(REPORT, ledger.left) if stops > 0.0 else ledger.left
+    return ledger.result(ledger.evaluate(chosen, "report", report))
+
+
+def final(
+    track: Track, surrogate: Surrogate, known: Sequence[Layout], budget: int, precision: float
+) -> list[Arm]:
+    """Return the best of a race of the best layouts of the exploration, no barrier and `known`."""
+    least = 3 * len(track.problem.site.events)
     found = surrogate.best(min(FINALISTS, max(1, budget // (4 * least) - 1)))
     finalists = list(dict.fromkeys([(), *found, *known]))
     first = max(least, budget // (3 * len(finalists)))
-    ends = track.race(finalists, budget, first, keep=3, stage="final", strict=True)
-    chosen = choose(surrogate, ends, track.seen.get((), track.nothing))
-    return ledger.result(ledger.evaluate(chosen, "report", ledger.left))
+    if precision == 0.0:
+        return track.race(finalists, budget, first, keep=3, stage="final", strict=True)
+
+    def contenders(arms: Sequence[Arm]) -> list[Arm]:
+        value, gain = state_of_final(surrogate, arms, track.seen[()])
+        best = np.argsort(value, kind="stable")[: max(3, math.ceil(KEPT * len(arms)))]
+        return [arms[i] for i in best.tolist()] if gain >= precision else []
+
+    first = min(first, max(least, STEP // len(finalists)))
+    return track.contest(finalists, budget, first, STEP, "final", contenders)
+
+
+def state_of_final(surrogate: Surrogate, arms: Sequence[Arm], nothing: Arm) -> tuple[Floats, float]:
+    """Return Z of the arms of a final, and what another `STEP` releases are expected to gain.
+
+    Z is over the risk without barriers, and the gain is relative to the least Z [-]. The releases
+    would be shared by all arms that were drawn equally often. `COMMON` of the variance is left out,
+    because releases that all arms have in common do not change their order.
+    """
+    value, variance = np.array([surrogate.joint(arm, nothing) for arm in arms]).T
+    known = np.array([sum(map(len, arm.releases.values())) for arm in arms], dtype=np.float64)
+    rivals = known == known.max()
+    more = np.where(rivals, STEP / rivals.sum(), 0.0)
+    learnt = np.sqrt((1.0 - COMMON) * variance * more / np.maximum(known + more, 1.0))
+    annual = np.array([arm.annual / surrogate.worth for arm in arms])
+    gain = expected_gain(value, np.diag(learnt), np.minimum(annual, value))
+    return value, gain / max(float(value.min()), 1e-9)
 
 
 def forecast_pool(
@@ -89,10 +144,10 @@ def forecast_pool(
 
     `value` is the network for the forecasts, by default the one that ships with the package.
     """
-    problem = ledger.problem
+    problem, singles = ledger.problem, single_barriers(menu)
     forecast = Forecast(problem, ensemble_for(ledger, menu.stations), value or value_network())
-    ledger.starts |= {*known, *single_barriers(menu)}
-    return forecasts_of(forecast, menu, known)
+    ledger.starts |= {*known, *singles}
+    return forecasts_of(forecast, menu, known, singles)
 
 
 def single_barriers(menu: Menu) -> list[Layout]:
@@ -100,10 +155,12 @@ def single_barriers(menu: Menu) -> list[Layout]:
     return [(b,) for kind in menu.problem.kinds for b in menu.singles(kind)]
 
 
-def forecasts_of(forecast: Forecast, menu: Menu, known: Sequence[Layout]) -> Surrogate:
-    """Return forecasts of all single barriers, of pairs of the best and of `known` layouts."""
+def forecasts_of(
+    forecast: Forecast, menu: Menu, known: Sequence[Layout], singles: Sequence[Layout]
+) -> Surrogate:
+    """Return forecasts of `known` layouts, of single barriers and of pairs of the best of them."""
     surrogate = Surrogate(menu.problem, forecast)
-    surrogate.add([*known, *single_barriers(menu)])
+    surrogate.add([*known, *singles])
     best = firsts(surrogate, BEST_OF)
     surrogate.add(joined(menu.problem, best, best))
     return surrogate
@@ -136,6 +193,7 @@ def explore(
     surrogate: Surrogate,
     budget: int,
     prices: Sequence[float] = (0.0,),
+    precision: float = 0.0,
 ) -> list[Arm]:
     """Simulate promising layouts in batches and let the surrogate learn from them.
 
@@ -147,19 +205,25 @@ def explore(
         Number of releases.
     prices : sequence of float
         Prices of capital [1/year] for which promising layouts are sought in turn.
+    precision : float
+        Expected fall of Z by the next batch below which the exploration ends, relative to Z [-].
+        With 0, the budget is used up in `BATCHES` batches; otherwise a batch has `STEP` releases.
     """
     problem, ledger = track.problem, track.ledger
     end = ledger.left - budget
     each = min(max(FEWEST, 2 * len(problem.site.events), int(EACH * math.sqrt(budget))), MOST)
     arms: list[Arm] = []
-    for i in range(BATCHES):
-        count = (ledger.left - end) // (each * (BATCHES - i)) - 1
+    batches = BATCHES if precision == 0.0 else max(BATCHES, math.ceil(budget / STEP))
+    for i in range(batches):
+        count = (ledger.left - end) // (each * (batches - i)) - 1
         if count < 1:
             break
         share = max(1, count // len(prices))
         wanted = dict.fromkeys(
             layout for price in prices for layout in surrogate.promising(share, BOLD, price)
         )
+        if i > 0 and precision > 0.0 and surrogate.gain(list(wanted)) < precision:
+            break
         found = track.look([(), *wanted], each, ledger.left - end)
         if not found:
             break
@@ -190,7 +254,7 @@ def choose(surrogate: Surrogate, ends: Sequence[Arm], nothing: Arm) -> Layout:
         return ()
     if surrogate.has_targets:
         return best_of_ends(ends).layout
-    value = {arm.layout: surrogate.joint(arm, nothing) for arm in ends}
+    value = {arm.layout: surrogate.joint(arm, nothing)[0] for arm in ends}
     most = min(value.values()) + AS_GOOD
     as_good = [layout for layout in value if value[layout] < most]
     fewest = min(len(layout) for layout in as_good)

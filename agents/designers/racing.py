@@ -358,6 +358,34 @@ class Track:
             alive = self._survivors(alive, keep, done == rounds - 1, done == 0)
         return sorted(alive, key=lambda arm: arm.key())[:keep]
 
+    def contest(
+        self,
+        layouts: Iterable[Layout],
+        budget: int,
+        first: int,
+        step: int,
+        stage: str,
+        contenders: Callable[[Sequence[Arm]], list[Arm]],
+    ) -> list[Arm]:
+        """Return all candidates of a race that ends when it is decided, with their releases.
+
+        Parameters
+        ----------
+        layouts, budget, first, stage
+            As in `race`, but strict.
+        step : int
+            Number of releases of each later round, which the candidates share.
+        contenders : callable
+            Function of all candidates that returns those that continue; none if it is decided.
+        """
+        end = self.ledger.left - min(budget, self.ledger.left)
+        arms = [Arm(self.problem, x, True, self.expect(x)) for x in dict.fromkeys(layouts)]
+        alive, each = arms, first
+        while alive and self._round(alive, each, end, stage, alive if alive != arms else []):
+            alive = contenders(arms)
+            each = step // max(len(alive), 1)
+        return arms
+
     def look(self, layouts: Iterable[Layout], each: int, budget: int) -> list[Arm]:
         """Return candidates with `each` releases, as many as the budget allows."""
         budget = min(budget, self.ledger.left)

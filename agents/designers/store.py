@@ -21,7 +21,7 @@ import msgspec
 from rigdda import MECHANICS, BadInput, DoubtfulInput, Layout, Outcome, __version__, distribution
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.intervals import estimate
-from rigdda.envs.outcome_cache import pack
+from rigdda.envs.outcome_cache import pack, unpack
 from rigdda.files import atomic
 
 FILE = "problem.json"
@@ -285,6 +285,15 @@ class Store:
         key = _key(problem, layout, sorted(asked.items()))
         found = self._recall(key, layout, drawn, simulate)
         return replace(found, evaluation=replace(found.evaluation, layout=layout))
+
+    def outcomes(
+        self, problem: DesignProblem, layout: Layout, seeds: Mapping[str, Sequence[int]]
+    ) -> list[Outcome]:
+        """Return the outcomes of releases of some events, which the store must keep.
+
+        The arguments and errors are those of `sample`, the order is that of `seeds`.
+        """
+        return unpack(self.sample(problem, layout, seeds).outcomes)
 
     def stored_releases(self) -> Iterator[StoredReleases]:
         """Yield the releases of each evaluation in the order in which they were requested.

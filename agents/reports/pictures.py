@@ -51,8 +51,8 @@ Floats = NDArray[np.float64]
 DRAWN = 30
 """Largest number of trajectories of an event that are drawn."""
 
-ENOUGH = 600
-"""Largest number of blocks of an event behind an envelope of a design; 30 are above the 95 %
+ENOUGH = 300
+"""Largest number of blocks of an event behind an envelope of a design; 15 are above the 95 %
 quantile."""
 
 EVERY = 0.05

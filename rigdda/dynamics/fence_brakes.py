@@ -1,8 +1,8 @@
 """Fences: barriers that yield at a constant force until their elongation is used up.
 
 A fence is a body that moves only along x, and only downhill. Its brake resists any force up to F =
-capacity / elongation (`yielding_fences.release_fences`). A larger force, whether from an impact or from
-a pile, moves the fence against F, so that the fence absorbs F times its displacement. When its
+capacity / elongation (`yielding_fences.release_fences`). A larger force, whether from an impact or
+from a pile, moves the fence against F, so that the fence absorbs F times its displacement. When its
 elongation is used up, the fence has absorbed its capacity and is removed.
 
 `yielding_fences.end_fences` adds the work of the brakes to the energy balance, and

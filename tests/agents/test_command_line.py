@@ -50,11 +50,17 @@ def rig(*arguments: object, folder: Path, stderr: int = subprocess.PIPE) -> subp
 
 def run(*arguments: object, folder: Path) -> str:
     """Run to success; return standard output. In a pipe only progress is told, now and then."""
+    return run_told(*arguments, folder=folder)[0]
+
+
+def run_told(*arguments: object, folder: Path) -> tuple[str, list[str]]:
+    """Run to success; return standard output and the answers that were told before the end."""
     process = rig(*arguments, folder=folder)
     out, err = process.communicate(timeout=300)
-    other = [line for line in err.splitlines() if not re.search(r": [\d,]+ of [\d,]+$", line)]
+    told = [line for line in err.splitlines() if not re.search(r": [\d,]+ of [\d,]+$", line)]
+    other = [line for line in told if not line.startswith("so far, with ")]
     assert (process.returncode, other) == (0, [])
-    return out
+    return out, told
 
 
 def refused(*arguments: object, folder: Path) -> str:
@@ -454,9 +460,10 @@ def test_the_accuracy_suite_is_a_table(tmp_path: Path) -> None:
     assert "damped-fall" in words and "order" in words
 
 
-def test_a_terminal_sees_progress(toml: Path, tmp_path: Path) -> None:
+def on_terminal(*arguments: object, folder: Path) -> bytes:
+    """Run to success with a terminal as standard error; return what it is sent."""
     ours, theirs = pty.openpty()
-    process = rig("simulate", toml, "--releases", 3, folder=tmp_path, stderr=theirs)
+    process = rig(*arguments, folder=folder, stderr=theirs)
     os.close(theirs)
     seen = b""
     try:
@@ -467,6 +474,23 @@ def test_a_terminal_sees_progress(toml: Path, tmp_path: Path) -> None:
     os.close(ours)
     process.communicate(timeout=300)
     assert process.returncode == 0
+    return seen
+
+
+def test_a_design_answers_before_it_is_done(toml: Path, tmp_path: Path) -> None:
+    words, told = run_told("design", toml, *TINY, "--out", "a", folder=tmp_path)
+    assert told and told[0].startswith("so far, with 40 releases of each layout: Z nothing ")
+    assert ", rule " in told[0] and ", constant " in told[0]
+    assert "verification: 40 new releases" in words
+    coarse = ("--budget", "4000", "--verify", "800", "--ground-samples", "0", "--precision", "0.3")
+    seen = on_terminal("design", toml, *coarse, "--out", "b", folder=tmp_path)
+    assert b"so far (100 releases each)" in seen and b"best so far" in seen
+    found = rows(tmp_path / "b/evaluations.csv")
+    assert int(found[-1]["simulations"]) < 4000 and int(found[-1]["releases"]) < 800
+
+
+def test_a_terminal_sees_progress(toml: Path, tmp_path: Path) -> None:
+    seen = on_terminal("simulate", toml, "--releases", 3, folder=tmp_path)
     assert b"tables and pictures" in seen and b"3/3" in seen  # the last state is always drawn
 
 
@@ -481,6 +505,10 @@ def test_a_terminal_sees_progress(toml: Path, tmp_path: Path) -> None:
         (
             ("design", "quick", "--target", "0"),
             "--target = '0': give a number above 0.0 and at most",
+        ),
+        (
+            ("design", "quick", "--precision", "2"),
+            "--precision = '2': give a number of at least 0.0 and at most 0.5",
         ),
         (("design", "quick", "--seed", "-1"), "--seed = '-1': give a whole number of at least 0"),
         (("train", "--model", "value", "--episodes", "3"), "--episodes is for --model policy"),

@@ -129,6 +129,14 @@ def test_what_does_not_search_says_so(name: str, valley: Valley) -> None:
     assert len(result.history.entries) == 1
 
 
+def test_no_seed_occurs_twice_in_a_stream() -> None:
+    """The generator draws words of 32 bits, of which two are equal in many long streams."""
+    for stream in STREAMS:
+        seeds = release_seeds(stream, 0, 20_000)
+        assert len(set(seeds)) == len(seeds)
+        assert release_seeds(stream, 0, 500, 19_500) == seeds[19_500:]
+
+
 def test_streams_of_release_seeds_never_meet() -> None:
     drawn = [
         {s for seed in range(20) for s in release_seeds(stream, seed, 200)} for stream in STREAMS

@@ -59,7 +59,7 @@ class Settings:
     sweep_tolerance : float
         Convergence tolerance for islands of several moving blocks, which take a step in eight
         substeps. In each substep the contacts are swept until no velocity changes by more than this
-        value times the number of blocks minus one [m/s], nor by more than 5 % of the greatest
+        value times the number of blocks minus one [m/s], nor by more than 2 % of the greatest
         speed, or for at most 100 sweeps.
     open_close_iterations : int
         Maximum number of open-close iterations per step; nearly all steps need 1 to 3. If they have

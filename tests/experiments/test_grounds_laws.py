@@ -98,7 +98,7 @@ def test_the_tables_note_their_kernels(tmp_path, monkeypatch):
     assert isinstance(road_cut.run(True, tmp_path), Number)
     assert (tmp_path / "road_cut.png").exists()
     assert {path.name for path in tmp_path.glob("*.csv")} >= {"laws.csv", "road_cut.csv"}
-    assert stale(tmp_path) == []
+    assert list(stale(tmp_path)) == []
 
 
 def test_the_package_runs_all_steps_and_returns_the_first_miss(tmp_path, monkeypatch):

@@ -10,7 +10,7 @@ import pytest
 from experiments.bench.cases import FRAME, single
 from experiments.bench.penetration import centroids
 from experiments.front import front
-from experiments.made_by import KERNELS
+from experiments.made_by import MADE_BY
 from experiments.speed_error import closed_forms, highway, knobs, study
 from experiments.speed_error.highway import Budget, Sample
 from experiments.speed_error.tables import bias, closed_table, total_error
@@ -108,7 +108,7 @@ def test_a_run_writes_its_tables_and_pictures(tmp_path, monkeypatch):
     number = study.run(True, tmp_path)
     assert number.passed, str(number)
     names = {"speed_error.csv", "speed_error.png", "speed_error.md", "highway.csv", "highway.png"}
-    assert {path.name for path in tmp_path.iterdir()} == names | {study.SAMPLES, KERNELS}
+    assert {path.name for path in tmp_path.iterdir()} == names | {study.SAMPLES, MADE_BY}
 
 
 def test_a_study_goes_on_with_the_samples_it_has(tmp_path, monkeypatch):

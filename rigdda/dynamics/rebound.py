@@ -41,6 +41,7 @@ from rigdda.dynamics.rows import (
     along_six,
     place_row,
 )
+from rigdda.dynamics.slots import copy_velocities
 from rigdda.dynamics.substep import aim_row, count_row, couple_face
 from rigdda.dynamics.sweeps import settle
 from rigdda.kernel import kernel
@@ -118,9 +119,7 @@ def aim_rebound(rows: Rows, n: int, active: int, share: float) -> None:
     Contacts with an impact keep their impulses, so that friction is limited by the total impulse of
     the impact.
     """
-    for s in range(n):
-        for q in range(3):
-            rows.slot[s, NOW + q] = rows.slot[s, BEFORE + q]
+    copy_velocities(rows.slot, n, BEFORE, NOW)
     for q in range(active):
         k = rows.active[q]
         row, fact = rows.row[k], rows.fact[k]
@@ -154,9 +153,7 @@ def rebound(
     struck = list_struck(rows, active)
     lost = work_from(rows, struck, FREE)
     start_rebound(rows, struck, h, touch)
-    for s in range(n):
-        for q in range(3):
-            rows.slot[s, BEFORE + q] = rows.slot[s, NOW + q]
+    copy_velocities(rows.slot, n, NOW, BEFORE)
     sweeps, share = 0, 1.0
     for attempt in range(3):
         aim_rebound(rows, n, struck, share)
@@ -193,9 +190,7 @@ def end_rebound(rows: Rows, active: int) -> None:
 @kernel
 def take_back(rows: Rows, n: int, active: int) -> None:
     """Take back a rebound."""
-    for s in range(n):
-        for q in range(3):
-            rows.slot[s, NOW + q] = rows.slot[s, BEFORE + q]
+    copy_velocities(rows.slot, n, BEFORE, NOW)
     for q in range(active):
         k = rows.active[q]
         row, fact = rows.row[k], rows.fact[k]

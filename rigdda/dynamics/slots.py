@@ -130,6 +130,14 @@ def drift(slots: Floats, scale: Floats, n: int, h: float, gone: float) -> None:
 
 
 @kernel
+def copy_velocities(slots: Floats, n: int, first: int, to: int) -> None:
+    """Copy the velocities of the bodies from three columns of their slots to three others."""
+    for s in range(n):
+        for q in range(3):
+            slots[s, to + q] = slots[s, first + q]
+
+
+@kernel
 def kinetic(slots: Floats, n: int, first: int) -> float:
     """Return the kinetic energy of the velocities in three columns of the slots [J]."""
     energy = 0.0

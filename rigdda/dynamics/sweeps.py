@@ -42,7 +42,7 @@ from rigdda.dynamics.rows import (
     along_six,
     push,
 )
-from rigdda.dynamics.slots import kinetic
+from rigdda.dynamics.slots import copy_velocities, kinetic
 from rigdda.kernel import arithmetic_kernel, kernel
 
 
@@ -271,9 +271,7 @@ def settle_safely(
     sweeps = settle(rows, n, active, number, reach, tolerance)
     if sweeps < MOST_SWEEPS or kinetic(rows.slot, n, NOW) <= kinetic(rows.slot, n, FREE):
         return sweeps
-    for s in range(n):
-        for q in range(3):
-            rows.slot[s, NOW + q] = rows.slot[s, FREE + q]
+    copy_velocities(rows.slot, n, FREE, NOW)
     for q in range(active):
         row = rows.row[rows.active[q]]
         row[IMPULSE] = row[IMPULSE + 1] = row[ROLLED] = row[ROLL_LIMIT] = 0.0

@@ -9,9 +9,9 @@ import msgspec
 import pytest
 
 from rigdda import Ditch, Embankment, Fence, GravityWall, Site
-from rigdda.agents.barrier_checks import LayoutChecks, check_layout
 from rigdda.agents.designers import rule
 from rigdda.agents.designers.menu import Menu
+from rigdda.app.barrier_checks import LayoutChecks, check_layout
 from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.barrier_formulas import OTHER, ROCK, BarrierCheck, Base
 from rigdda.envs.fence_checks import demand_at

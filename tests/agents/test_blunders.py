@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from rigdda import BadInput, Site
-from rigdda.agents.new_site import SiteRequest, compose
-from rigdda.agents.site_check import oddities
+from rigdda.app.new_site import SiteRequest, compose
+from rigdda.app.site_check import oddities
 
 SURVEY = """chainage,elevation
 3100,588.2

@@ -11,9 +11,9 @@ from light_site import LIGHT
 from test_rule import envelope
 
 from rigdda import Fence
-from rigdda.agents.barrier_checks import BarrierCheck, LayoutChecks
 from rigdda.agents.designers.rule import judge
-from rigdda.agents.reports import checks, demand_picture
+from rigdda.app.barrier_checks import BarrierCheck, LayoutChecks
+from rigdda.app.reports import checks, demand_picture
 from rigdda.envs import DesignProblem
 from rigdda.envs.fence_checks import FenceCheck, demand_at
 
@@ -93,8 +93,8 @@ def test_the_sheets_hold_every_figure_to_the_digit(problem: DesignProblem) -> No
 
 
 def test_a_design_writes_its_checks(tmp_path: Path) -> None:
-    from rigdda.agents import jobs
-    from rigdda.agents.reports.folder import FILES
+    from rigdda.app import jobs
+    from rigdda.app.reports.folder import FILES
 
     assert set(checks.FILES) <= set(FILES)
     problem = DesignProblem(LIGHT, kinds=("fence",))

@@ -19,7 +19,7 @@ from rerun.chunk import RrdReader
 
 import rigdda
 from rigdda import Site
-from rigdda.agents import cli
+from rigdda.app import cli
 from rigdda.barriers import to_tables
 
 CHUTE = "chute.toml"
@@ -39,7 +39,7 @@ NUMBERS = ("objective", "objective_low", "objective_high", "capital", "harm", "r
 
 
 def rig(*arguments: object, folder: Path, stderr: int = subprocess.PIPE) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "rigdda.agents.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "rigdda.app.cli", *map(str, arguments)]
     root = Path(rigdda.__file__).parents[1]
     path = os.pathsep.join([str(root), *filter(None, [os.environ.get("PYTHONPATH")])])
     env = os.environ | {"PYTHONPATH": path, "PYTHONWARNINGS": "error", "COLUMNS": "80"}

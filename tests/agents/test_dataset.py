@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from rigdda import BadInput
-from rigdda.agents import cli, dataset
-from rigdda.agents.dataset import Recipe
 from rigdda.agents.policy import WIDTH
+from rigdda.app import cli, dataset
+from rigdda.app.dataset import Recipe
 from rigdda.barriers import from_table
 from rigdda.envs import DesignProblem
 

@@ -133,7 +133,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def exam(folder: Path, entry: str, *more: str) -> subprocess.CompletedProcess[str]:
     """Run the command in a process of its own, as a user does."""
-    program = [sys.executable, "-m", "rigdda.agents.cli", "exam", "--spec", "spec.toml"]
+    program = [sys.executable, "-m", "rigdda.app.cli", "exam", "--spec", "spec.toml"]
     root = str(Path(__file__).parents[2])
     return subprocess.run(
         [*program, "--entry", f"entries_of_test:{entry}", "--out", f"out-{entry}", *more],

@@ -12,8 +12,8 @@ import pytest
 
 import rigdda
 from rigdda import BadInput, Diverged, Run, Site
-from rigdda.agents import cli
-from rigdda.agents.terminal import Stopped, folder_for, recorded_run
+from rigdda.app import cli
+from rigdda.app.terminal import Stopped, folder_for, recorded_run
 from rigdda.files import atomic
 
 

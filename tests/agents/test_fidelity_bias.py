@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from rigdda import BadInput, Site
-from rigdda.agents import fidelity_bias
-from rigdda.agents.cli import main
 from rigdda.agents.designers.protocol import release_seeds
+from rigdda.app import fidelity_bias
+from rigdda.app.cli import main
 from rigdda.envs import DesignProblem, problem
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rigdda import BadInput, Site
-from rigdda.agents import fit
-from rigdda.agents.cli import main
-from rigdda.agents.fit import check_parameters, run_outs, scores
-from rigdda.agents.observations import RUN_OUT, DataSet, read
-from rigdda.agents.parameters import Parameter, parse, with_values
+from rigdda.app.cli import main
+from rigdda.app.uncertainty import fit
+from rigdda.app.uncertainty.fit import check_parameters, run_outs, scores
+from rigdda.app.uncertainty.observations import RUN_OUT, DataSet, read
+from rigdda.app.uncertainty.parameters import Parameter, parse, with_values
 from rigdda.model.site_tables import Rebound
 
 SITE = Site.load("verge")

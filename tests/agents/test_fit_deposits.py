@@ -11,10 +11,10 @@ import pytest
 from test_command_line import refused, rig, rows, run
 
 from rigdda import BadInput, Site
-from rigdda.agents import fit
-from rigdda.agents.observations import DEPOSIT, RUN_OUT, DataSet, read
-from rigdda.agents.parameters import parse, read_posterior, with_values
-from rigdda.agents.score_surface import best_places
+from rigdda.app.uncertainty import fit
+from rigdda.app.uncertainty.observations import DEPOSIT, RUN_OUT, DataSet, read
+from rigdda.app.uncertainty.parameters import parse, read_posterior, with_values
+from rigdda.app.uncertainty.score_surface import best_places
 from rigdda.passages import passages
 
 SITE = Site.load("quick")

@@ -15,14 +15,15 @@ from test_command_line import rows
 from valley import SITE, Barren, Valley, seen
 
 from rigdda import Ditch, Fence
-from rigdda.agents import designers, jobs
-from rigdda.agents.barrier_checks import LayoutChecks
-from rigdda.agents.design_study import DesignStudy, VerifiedLayout
+from rigdda.agents import designers
 from rigdda.agents.designers.frontier import TriedLayout, frontier
 from rigdda.agents.designers.protocol import DesignResult, History, best_of_finals, ranked
 from rigdda.agents.designers.rule import RuleAnswer
-from rigdda.agents.reports import findings, frontier_report
-from rigdda.agents.reports.wording import at_most, euros, percent, span
+from rigdda.app import jobs
+from rigdda.app.barrier_checks import LayoutChecks
+from rigdda.app.design_study import DesignStudy, VerifiedLayout
+from rigdda.app.reports import findings, frontier_report
+from rigdda.app.reports.wording import at_most, euros, percent, span
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.design_envelope import DesignEnvelope

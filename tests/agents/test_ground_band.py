@@ -11,11 +11,11 @@ from test_command_line import png_size, refused, rig, rows, run
 
 import rigdda
 from rigdda import Site, load_layout
-from rigdda.agents.ground_band import BandLayout, GroundSample, inputs
-from rigdda.agents.parameters import Posterior, set_numbers
-from rigdda.agents.reports import band_report
-from rigdda.agents.reports.wording import span
-from rigdda.agents.varied_sites import Priced
+from rigdda.app.reports import band_report
+from rigdda.app.reports.wording import span
+from rigdda.app.uncertainty.ground_band import BandLayout, GroundSample, inputs
+from rigdda.app.uncertainty.parameters import Posterior, set_numbers
+from rigdda.app.uncertainty.varied_sites import Priced
 from rigdda.envs.cost import judge
 
 COMMAND = ("design", "narrow", "--budget", 300, "--verify", 40, "--seed", 2)
@@ -130,7 +130,7 @@ def test_a_choice_survives_or_not(chosen: float, rival: float, spread: float, st
 
 
 def test_the_verdict_names_the_rival() -> None:
-    from rigdda.agents.ground_band import Band
+    from rigdda.app.uncertainty.ground_band import Band
 
     band = Band((sample(10, 12, 0), sample(15, 11, 10), sample(12, 11, 10)), 100, "", ())
     words = band_report.verdict(band)

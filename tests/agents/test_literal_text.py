@@ -11,10 +11,10 @@ from test_command_line import png_size
 
 import rigdda
 from rigdda import Site
-from rigdda.agents import site_check
-from rigdda.agents.reports import tables
-from rigdda.agents.site_check import Trial
-from rigdda.agents.terminal import progress, show
+from rigdda.app import site_check
+from rigdda.app.reports import tables
+from rigdda.app.site_check import Trial
+from rigdda.app.terminal import progress, show
 
 NAMES = (
     "km 3 [/b]",

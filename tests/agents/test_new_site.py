@@ -14,13 +14,13 @@ from test_command_line import png_size, refused, rig, run
 
 import rigdda
 from rigdda import Event, Site
-from rigdda.agents import site_check
-from rigdda.agents.site_check import Trial, oddities
+from rigdda.app import site_check
+from rigdda.app.site_check import Trial, oddities
+from rigdda.ground.grounds import GROUNDS
+from rigdda.ground.surface import Interface
 from rigdda.model.existing import Existing
 from rigdda.model.forest import Forest
-from rigdda.model.grounds import GROUNDS
 from rigdda.model.site_tables import Motion
-from rigdda.model.surface import Interface
 from rigdda.model.traffic import Traffic
 
 GRID = """chainage,elevation

@@ -12,14 +12,14 @@ from msgspec.structs import replace
 from valley import Valley
 
 from rigdda import BadInput, Fence, Layout, Site
-from rigdda.agents import jobs
-from rigdda.agents.design_study import VerifiedLayout
 from rigdda.agents.designers import race
 from rigdda.agents.designers.protocol import Entry, verify
 from rigdda.agents.designers.store import Store
 from rigdda.agents.designers.surrogate import expected_gain
-from rigdda.agents.reports import interim_answer
-from rigdda.agents.verification import BEST, InterimAnswer, Verification, clear, stages
+from rigdda.app import jobs
+from rigdda.app.design_study import VerifiedLayout
+from rigdda.app.reports import interim_answer
+from rigdda.app.verification import BEST, InterimAnswer, Verification, clear, stages
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.comparison import Difference
 from rigdda.envs.problem import Targets

@@ -29,11 +29,11 @@ import pytest
 
 import rigdda
 from rigdda import MECHANICS, BadInput, Site
-from rigdda.agents import browser, cli, report_server
-from rigdda.agents.reports import assumptions, report_sections
-from rigdda.agents.reports.exhibits import EXHIBITS
-from rigdda.agents.reports.html_blocks import inline
 from rigdda.agents.run_record import RunRecord, read
+from rigdda.app import browser, cli, report_server
+from rigdda.app.reports import assumptions, report_sections
+from rigdda.app.reports.exhibits import EXHIBITS
+from rigdda.app.reports.html_blocks import inline
 
 DESIGN = [
     "design", "chute.toml", "--budget", "60", "--verify", "40", "--target", "0.05",
@@ -54,7 +54,7 @@ class Made(NamedTuple):
 def made(site: Site, tmp_path_factory: pytest.TempPathFactory) -> Made:
     folder = tmp_path_factory.mktemp("report")
     site.save(folder / "chute.toml")
-    command = [sys.executable, "-m", "rigdda.agents.cli"]
+    command = [sys.executable, "-m", "rigdda.app.cli"]
     printed = ""
     for arguments in (
         [*DESIGN, "--out", "decision"],
@@ -561,7 +561,7 @@ def test_connections_that_end_early_are_no_error(
 
 
 def test_the_server_shows_both_and_ends_on_ctrl_c(made: Made) -> None:
-    command = [sys.executable, "-m", "rigdda.agents.cli", "report", "decision", "--serve"]
+    command = [sys.executable, "-m", "rigdda.app.cli", "report", "decision", "--serve"]
     default = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
     process = subprocess.Popen(
         command, cwd=made.folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,

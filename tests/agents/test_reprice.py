@@ -15,10 +15,10 @@ from test_command_line import refused, rows, run
 
 import rigdda
 from rigdda import BadInput, Outcome, Site
-from rigdda.agents import archive, jobs, reprice
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import release_seeds
-from rigdda.agents.reports import frontier_report
+from rigdda.app import archive, jobs, reprice
+from rigdda.app.reports import frontier_report
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation, ensemble
 from rigdda.envs.cost import judge

@@ -12,7 +12,7 @@ from test_command_line import png_size, refused, rig, rows, run
 
 import rigdda
 from rigdda import BadInput, Fence, Site, save_layout
-from rigdda.agents.parameters import (
+from rigdda.app.uncertainty.parameters import (
     Parameter,
     Posterior,
     choose,
@@ -21,10 +21,10 @@ from rigdda.agents.parameters import (
     read_posterior,
     set_numbers,
 )
-from rigdda.agents.sensitivity import Response, analyse, of_function, places, plan
-from rigdda.agents.sensitivity import run as analyse_site
+from rigdda.app.uncertainty.sensitivity import Response, analyse, of_function, places, plan
+from rigdda.app.uncertainty.sensitivity import run as analyse_site
 from rigdda.envs.cost import judge
-from rigdda.model.grounds import GROUNDS
+from rigdda.ground.grounds import GROUNDS
 
 ISHIGAMI = [Parameter(name, -np.pi, np.pi) for name in "abc"]
 ISHIGAMI_S1, ISHIGAMI_ST = (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437)  # a = 7, b = 0.1
@@ -157,7 +157,7 @@ def test_a_posterior_is_one_input(tmp_path: Path) -> None:
     drawn = np.array([joint.at(u) for u in (np.arange(1000) + 0.5) / 1000])
     assert drawn.mean(axis=0) == pytest.approx(values.mean(axis=0))
     file = tmp_path / "posterior.csv"
-    from rigdda.agents.reports.tables import write_rows
+    from rigdda.app.reports.tables import write_rows
 
     write_rows(file, joint.rows())
     read = read_posterior(file, Site.load("narrow"))

@@ -15,9 +15,9 @@ from scipy.stats import binom
 from test_command_line import png_size, refused, rig, rows, run
 
 from rigdda import Fence, Site
-from rigdda.agents.reports import stations
-from rigdda.agents.reports.simulation_folder import TABLES
-from rigdda.agents.reports.stations import LEVELS, QUANTITIES, Passing
+from rigdda.app.reports import stations
+from rigdda.app.reports.simulation_folder import TABLES
+from rigdda.app.reports.stations import LEVELS, QUANTITIES, Passing
 from rigdda.envs.intervals import mid_p
 from rigdda.envs.quantiles import quantiles
 from rigdda.passages import PASSAGE, STATES, STOP, Passages, passages

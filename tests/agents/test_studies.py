@@ -14,9 +14,9 @@ from test_command_line import png_size, refused, rig, rows, run
 
 import rigdda
 from rigdda import Site
-from rigdda.agents import studies
-from rigdda.agents.reports import findings, study_report
-from rigdda.agents.reports.tables import _interval, write_rows
+from rigdda.app import studies
+from rigdda.app.reports import findings, study_report
+from rigdda.app.reports.tables import _interval, write_rows
 from rigdda.envs.comparison import difference
 from rigdda.envs.cost import stratified
 from rigdda.envs.intervals import upper_bound

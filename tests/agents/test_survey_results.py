@@ -13,13 +13,13 @@ from rich.console import Console, RenderableType
 
 import rigdda
 from rigdda import Fence, Site
-from rigdda.agents import studies
 from rigdda.agents.designers.protocol import Entry
-from rigdda.agents.reports import stations, study_report, tables
-from rigdda.agents.reports.stations import Passing
-from rigdda.agents.reports.tables import EvaluationsFile
-from rigdda.agents.reports.wording import order, surveyed
-from rigdda.agents.studies import Study
+from rigdda.app import studies
+from rigdda.app.reports import stations, study_report, tables
+from rigdda.app.reports.stations import Passing
+from rigdda.app.reports.tables import EvaluationsFile
+from rigdda.app.reports.wording import order, surveyed
+from rigdda.app.studies import Study
 from rigdda.envs.cost import judge
 from rigdda.model.site_tables import Origin
 from rigdda.passages import passages

@@ -19,9 +19,9 @@ import pytest
 
 import rigdda
 from rigdda import BadInput, Ditch, Site, distribution
-from rigdda.agents import cli
 from rigdda.agents.corridor.planning import Planner
-from rigdda.agents.reports import corridor_folder
+from rigdda.app import cli
+from rigdda.app.reports import corridor_folder
 from rigdda.envs import CorridorProblem
 from rigdda.passages import passages
 

@@ -16,7 +16,7 @@ from scipy.stats import trim_mean
 
 from rigdda.agents.exam.scorer import ExamPart, ExamScore
 from rigdda.agents.exam.specification import References
-from rigdda.agents.reports import pictures, tables
+from rigdda.app.reports import pictures, tables
 from rigdda.rounding import between
 
 if TYPE_CHECKING:

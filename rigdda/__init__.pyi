@@ -18,11 +18,11 @@ from .barriers.layout import load_layout, save_layout
 from .dynamics.run import Run
 from .dynamics.simulation import Simulation, simulate_many
 from .errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
+from .ground import grounds
 from .ground.prices import Bill, Consequences, Prices
 from .ground.surface import Surface
 from .ground.terrain import Terrain
 from .lumped_mass import Points, lumped
-from .ground import grounds
 from .model.block import Block
 from .model.corridor import Corridor, CorridorSection
 from .model.existing import Existing

@@ -1171,7 +1171,7 @@ def exam(
     Writes results.csv (a row for each task), summary.csv (interquartile means with intervals) and
     score.png. An interrupted exam continues where it stopped.
     """
-    from rigdda.agents.exam import ranking, scorer, specification
+    from rigdda.app.exam import ranking, scorer, specification
 
     asked = specification.load(spec)
     references = specification.references(asked, spec)

@@ -27,9 +27,10 @@ import numpy as np
 from rigdda import MECHANICS, BadInput, Layout, __version__, check
 from rigdda.agents.designers import rule
 from rigdda.agents.designers.store import Store
-from rigdda.agents.exam import entrant
-from rigdda.agents.exam.counter import ReleaseCounter, from_tables, problems_of
-from rigdda.agents.exam.messages import (
+from rigdda.agents.limits import SEED
+from rigdda.app.exam import entrant
+from rigdda.app.exam.counter import ReleaseCounter, from_tables, problems_of
+from rigdda.app.exam.messages import (
     FailRequest,
     FlagRequest,
     Request,
@@ -39,8 +40,7 @@ from rigdda.agents.exam.messages import (
     decode_request,
     encode,
 )
-from rigdda.agents.exam.specification import References, Specification
-from rigdda.agents.limits import SEED
+from rigdda.app.exam.specification import References, Specification
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.observation import observe
 from rigdda.files import atomic

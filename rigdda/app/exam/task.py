@@ -17,7 +17,7 @@ from rigdda import BadInput, Barrier, Layout, Site, check
 from rigdda.agents.designers import catalogue
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.store import Ask, Store, StoredEvaluation
-from rigdda.agents.exam.messages import (
+from rigdda.app.exam.messages import (
     AnyReply,
     BatchReply,
     CrossingsReply,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigdda import BadInput, Layout, check
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.exam.task import Task
+from rigdda.app.exam.task import Task
 
 FINALISTS = 5
 """Number of the best layouts of a search that are compared on new releases."""
@@ -30,7 +30,7 @@ class AskTell:
     Parameters
     ----------
     task : Task
-        The task of the exam, or one of `rigdda.agents.exam.counter.practice`.
+        The task of the exam, or one of `rigdda.app.exam.counter.practice`.
     releases : int, optional
         Number of releases of each layout. By default, the budget suffices for 60 layouts.
     final : float
@@ -49,7 +49,7 @@ class AskTell:
     Examples
     --------
     >>> from rigdda.agents import AskTell
-    >>> from rigdda.agents.exam.counter import practice
+    >>> from rigdda.app.exam.counter import practice
     >>> search = AskTell(practice("narrow-1000000", budget=60))
     >>> rng = np.random.default_rng(0)
     >>> while search.open:

@@ -16,8 +16,8 @@ import numpy as np
 
 from rigdda import BadInput
 from rigdda.agents.designers import catalogue
-from rigdda.agents.exam import guard
-from rigdda.agents.exam.messages import (
+from rigdda.app.exam import guard
+from rigdda.app.exam.messages import (
     AnyReply,
     FailRequest,
     FlagRequest,
@@ -27,7 +27,7 @@ from rigdda.agents.exam.messages import (
     decode_reply,
     encode,
 )
-from rigdda.agents.exam.task import CorridorTask, Task, make_task
+from rigdda.app.exam.task import CorridorTask, Task, make_task
 from rigdda.barriers import as_layout, to_tables
 from rigdda.envs.outcome_cache import fingerprint
 from rigdda.envs.problem import is_vector

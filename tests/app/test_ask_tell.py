@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rigdda import BadInput
-from rigdda.agents import AskTell
-from rigdda.agents.exam import entries
-from rigdda.agents.exam.counter import practice
+from rigdda.app.exam import entries
+from rigdda.app.exam.ask_tell import AskTell
+from rigdda.app.exam.counter import practice
 
 SITE = "narrow-2000000003"
 

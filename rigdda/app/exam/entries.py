@@ -13,7 +13,7 @@ from rigdda.agents import designers
 from rigdda.agents.designers import rule
 from rigdda.agents.designers.constant import constant as best_constant
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.exam.task import Task
+from rigdda.app.exam.task import Task
 
 LEAST = 60
 """Least number of releases of a search."""

@@ -11,7 +11,8 @@ import numpy as np
 from rigdda import BadInput, Error, Layout, check
 from rigdda.agents.designers import catalogue
 from rigdda.agents.designers.store import Store, StoredEvaluation
-from rigdda.agents.exam.messages import (
+from rigdda.agents.limits import SEED
+from rigdda.app.exam.messages import (
     AnyReply,
     BatchReply,
     CrossingsReply,
@@ -23,8 +24,7 @@ from rigdda.agents.exam.messages import (
     Tables,
     TaskOrder,
 )
-from rigdda.agents.exam.task import Task
-from rigdda.agents.limits import SEED
+from rigdda.app.exam.task import Task
 from rigdda.barriers import from_table
 from rigdda.envs import DesignProblem, Evaluation
 

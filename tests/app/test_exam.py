@@ -16,9 +16,9 @@ import pytest
 from rigdda import MECHANICS, BadInput, Ditch, sites
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.exam import counter, ranking, scorer, specification
-from rigdda.agents.exam.counter import practice
-from rigdda.agents.exam.specification import Anchor, References, tables
+from rigdda.app.exam import counter, ranking, scorer, specification
+from rigdda.app.exam.counter import practice
+from rigdda.app.exam.specification import Anchor, References, tables
 from rigdda.envs import DesignProblem
 from rigdda.model.site_names import SPLITS, instance
 
@@ -108,7 +108,7 @@ def broken(task):
 
 
 def spender(task):
-    from rigdda.agents.exam.entries import constant
+    from rigdda.app.exam.entries import constant
     return [constant(own) for own in task.sections]
 """
 

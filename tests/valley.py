@@ -1,4 +1,4 @@
-"""A design problem whose answer is known."""
+"""A design problem whose answer is known, and the fixtures of tests that use it."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import zlib
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
+import pytest
 from light_site import LIGHT
 
 import rigdda
 from rigdda import Barrier, Layout, Outcome, Site
 from rigdda.agents.designers import catalogue
-from rigdda.envs import DesignProblem, Evaluation, ensemble
+from rigdda.envs import DesignProblem, Evaluation, design_envelope, ensemble
 from rigdda.envs.cost import judge
 from rigdda.envs.outcome_cache import Sample
 
@@ -115,3 +117,25 @@ class Barren(Valley):
 
     def catch(self, barrier: Barrier) -> float:
         return 0.0
+
+
+@pytest.fixture(scope="session")
+def site() -> Site:
+    return SITE
+
+
+@pytest.fixture
+def problem(site: Site) -> DesignProblem:
+    return DesignProblem(site)
+
+
+@pytest.fixture
+def few_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Release few blocks for design envelopes."""
+    monkeypatch.setattr(design_envelope, "of", partial(design_envelope.of, blocks=60))
+
+
+@pytest.fixture
+def valley(site: Site, few_blocks: None, monkeypatch: pytest.MonkeyPatch) -> Valley:
+    monkeypatch.setattr("rigdda.agents.designers.catalogue.ensemble", seen)
+    return Valley(site)

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
-from rigdda.agents.exam.scorer import ExamPart, ExamScore
-from rigdda.agents.exam.specification import References
+from rigdda.app.exam.scorer import ExamPart, ExamScore
+from rigdda.app.exam.specification import References
 from rigdda.app.reports import pictures, tables
 from rigdda.rounding import between
 

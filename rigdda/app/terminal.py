@@ -19,6 +19,7 @@ from rigdda.agents.limits import RELEASES
 if TYPE_CHECKING:
     from rigdda import Layout, Site
     from rigdda.agents.run_record import RunRecord
+    from rigdda.app.design_study import ComparedLayouts
 
 layout_option = click.option(
     "--layout",
@@ -128,6 +129,13 @@ def count_option(name: str, least: int, default: int, words: str) -> Callable[..
     """Return an option that takes a count, for example of releases."""
     kind = WholeNumber(least, RELEASES)
     return click.option(name, type=kind, default=default, show_default=True, help=words)
+
+
+checks_option = click.option(
+    "--checks", type=click.Choice(("required", "reported")), default="required", show_default=True,
+    help="Whether every barrier must meet the checks of its kind, such as energy and height of a "
+    "fence, or they are only reported.",
+)  # fmt: skip
 
 
 def counted(number: int, noun: str) -> str:
@@ -457,3 +465,29 @@ def _console(stderr: bool = False) -> Console:
     from rich.console import Console
 
     return Console(stderr=stderr, markup=False, emoji=False, highlight=False)
+
+
+def warn_of_placeholders(site: str) -> None:
+    """Print a note if a site file still has placeholders of `rigdda new`."""
+    from rigdda.app import site_check
+
+    if count := site_check.placeholders(site):
+        note(f"the site file marks {count} values as placeholders to replace")
+
+
+TRAFFIC = (
+    "risk to the traffic on {0.section_length:g} m of road, per year: vehicles hit by falling "
+    "rock,\nvehicles that run into debris, deaths, deaths per km, and the individual risk\n"
+    "of a person who travels it {0.commuter_trips:g} times, with the upper end of its 95 % interval"
+)
+"""Line above the table of the risk to a `Traffic`."""
+
+
+def show_risks(done: ComparedLayouts) -> None:
+    """Print the risk of each layout to the traffic, if the site has traffic."""
+    from rigdda.app.reports import tables
+
+    risks = tables.risks(done)
+    if risks is not None:
+        click.echo(TRAFFIC.format(done.problem.site.traffic))
+        show(risks)

@@ -255,7 +255,7 @@ def test_a_drawing_becomes_a_site(tmp_path):
 def test_a_drawing_without_the_extra_is_one_clear_error(tmp_path):
     (tmp_path / "flat.dxf").write_text("0\nEOF\n")
     code = (
-        "import sys; sys.modules['ezdxf'] = None; from rigdda.agents import cli; "
+        "import sys; sys.modules['ezdxf'] = None; from rigdda.app import cli; "
         "sys.exit(cli.main(['new', 'a', '--profile', 'flat.dxf']))"
     )
     done = subprocess.run(

@@ -106,3 +106,7 @@ COMMANDS = (
 
 for command in COMMANDS:
     cli.add_command(command)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

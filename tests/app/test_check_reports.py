@@ -7,8 +7,8 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from envelopes import envelope
 from light_site import LIGHT
-from test_rule import envelope
 
 from rigdda import Fence
 from rigdda.agents.designers.rule import judge
@@ -93,12 +93,12 @@ def test_the_sheets_hold_every_figure_to_the_digit(problem: DesignProblem) -> No
 
 
 def test_a_design_writes_its_checks(tmp_path: Path) -> None:
-    from rigdda.app import jobs
+    from rigdda.app import design
     from rigdda.app.reports.folder import FILES
 
     assert set(checks.FILES) <= set(FILES)
     problem = DesignProblem(LIGHT, kinds=("fence",))
-    done, _ = jobs.study(problem, "rule", 40, 0, 20, tmp_path, lambda *_: None)
+    done, _ = design.design(problem, "rule", 40, 0, 20, tmp_path, lambda *_: None)
     checks.write(done, tmp_path)
     with (tmp_path / "checks.csv").open(newline="", encoding="utf-8") as file:
         table = [*csv.DictReader(file)]

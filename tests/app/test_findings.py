@@ -9,7 +9,7 @@ from valley import SITE, Barren, Valley
 
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, History
-from rigdda.app.jobs import failed_trials, trial_layouts
+from rigdda.app.remaining_risk import failed_trials, trial_layouts
 from rigdda.app.reports import findings
 from rigdda.envs import DesignProblem, Evaluation
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_command_line import refused, rig, rows, run
+from processes import refused, rig, rows, run
 
 from rigdda import BadInput, Site
 from rigdda.app.uncertainty import fit

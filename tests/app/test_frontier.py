@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_command_line import rows
+from processes import rows
 from valley import SITE, Barren, Valley, seen
 
 from rigdda import Ditch, Fence
@@ -19,7 +19,7 @@ from rigdda.agents import designers
 from rigdda.agents.designers.frontier import TriedLayout, frontier
 from rigdda.agents.designers.protocol import DesignResult, History, best_of_finals, ranked
 from rigdda.agents.designers.rule import RuleAnswer
-from rigdda.app import jobs
+from rigdda.app import design, verified_frontier
 from rigdda.app.barrier_checks import LayoutChecks
 from rigdda.app.design_study import DesignStudy, VerifiedLayout
 from rigdda.app.reports import findings, frontier_report
@@ -294,7 +294,7 @@ def test_a_missed_target_returns_a_verified_frontier(
 ) -> None:
     monkeypatch.setattr("rigdda.agents.designers.catalogue.ensemble", seen)
     problem = site(SITE, targets={"reach": 1e-4})
-    done, _ = jobs.study(problem, "race", 3_000, seed, 500, tmp_path, lambda *_: None)
+    done, _ = design.design(problem, "race", 3_000, seed, 500, tmp_path, lambda *_: None)
     chosen = done.chosen.evaluation
     assert chosen.targets == "missed" and done.frontier
     known = done.result.tried
@@ -306,7 +306,7 @@ def test_a_missed_target_returns_a_verified_frontier(
     }
     table = rows(tmp_path / "evaluations.csv")
     extra = [row for row in table if row["stage"] == "frontier"]
-    assert len(extra) <= jobs.MOST_VERIFIED + len(done.cases)
+    assert len(extra) <= verified_frontier.MOST_VERIFIED + len(done.cases)
     assert len({row["barriers"] for row in extra}) == len(extra)  # each once
     assert len(extra) >= sum(one.verified is not None for one in done.frontier) - len(done.cases)
     told = {  # the choice is verified on releases that did not affect it
@@ -333,7 +333,7 @@ def test_a_missed_target_returns_a_verified_frontier(
     assert [float(row["cost"]) for row in written] == [one.cost for one in done.frontier]
     assert [float(row["reach_bound"]) for row in written] == [o.level for o in done.frontier]
     assert (tmp_path / "frontier.png").read_bytes().startswith(b"\x89PNG")
-    again, resumed = jobs.study(problem, "race", 3_000, seed, 500, tmp_path, lambda *_: None)
+    again, resumed = design.design(problem, "race", 3_000, seed, 500, tmp_path, lambda *_: None)
     assert resumed.simulated == 0 and again.frontier == done.frontier
     frontier_report.write(tmp_path, problem, ())
     assert not (tmp_path / "frontier.csv").exists()

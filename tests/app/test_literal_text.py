@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from test_command_line import png_size
+from processes import png_size
 
 import rigdda
 from rigdda import Site

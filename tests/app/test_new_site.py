@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from test_command_line import png_size, refused, rig, run
+from processes import png_size, refused, rig, run
 
 import rigdda
 from rigdda import Event, Site

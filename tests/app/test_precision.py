@@ -16,10 +16,11 @@ from rigdda.agents.designers import race
 from rigdda.agents.designers.protocol import Entry, verify
 from rigdda.agents.designers.store import Store
 from rigdda.agents.designers.surrogate import expected_gain
-from rigdda.app import jobs
+from rigdda.app import design
 from rigdda.app.design_study import VerifiedLayout
+from rigdda.app.interim_answer import BEST, InterimAnswer
 from rigdda.app.reports import interim_answer
-from rigdda.app.verification import BEST, InterimAnswer, Verification, clear, stages
+from rigdda.app.verification import Verification, clear, stages
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.comparison import Difference
 from rigdda.envs.problem import Targets
@@ -173,11 +174,11 @@ def test_a_study_uses_all_releases_or_stops(site: Site, few_blocks: None, tmp_pa
     for precision in (0.0, 0.1):
         out = tmp_path / str(precision)
         out.mkdir()
-        done, _ = jobs.study(
+        done, _ = design.design(
             problem, "race", 1500, 0, 400, out, lambda *_: None, precision=precision
         )
         assert {c.evaluation.releases for c in done.cases} == {done.chosen.evaluation.releases}
-        again, resumed = jobs.study(
+        again, resumed = design.design(
             problem, "race", 1500, 0, 400, out, lambda *_: None, precision=precision
         )
         assert resumed.simulated == 0

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from test_command_line import refused, rows, run
+from processes import refused, rows, run
 
 import rigdda
 from rigdda import BadInput, Outcome, Site
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import release_seeds
-from rigdda.app import archive, jobs, reprice
+from rigdda.app import archive, design, reprice
 from rigdda.app.reports import frontier_report
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation, ensemble
@@ -31,7 +31,7 @@ def designed(site: Site, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a design with a target that nothing meets."""
     folder = tmp_path_factory.mktemp("designed")
     problem = DesignProblem(site, targets={"reach": 0.0005}, max_cost=1200.0)
-    done, _ = jobs.study(problem, "race", 700, 0, VERIFIED, folder, lambda *_: None)
+    done, _ = design.design(problem, "race", 700, 0, VERIFIED, folder, lambda *_: None)
     assert done.frontier
     return folder
 
@@ -115,7 +115,7 @@ def with_traffic(site: Site, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("traffic")
     busy = msgspec.structs.replace(site, traffic=rigdda.Traffic(8000.0, 80.0, 250.0))
     problem = DesignProblem(busy, targets={"individual": 1e-5})
-    jobs.study(problem, "race", 700, 0, VERIFIED, folder, lambda *_: None)
+    design.design(problem, "race", 700, 0, VERIFIED, folder, lambda *_: None)
     return folder
 
 

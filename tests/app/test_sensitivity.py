@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_command_line import png_size, refused, rig, rows, run
+from processes import png_size, refused, rig, rows, run
 
 import rigdda
 from rigdda import BadInput, Fence, Site, save_layout

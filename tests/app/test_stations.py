@@ -11,8 +11,8 @@ import msgspec
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from processes import png_size, refused, rig, rows, run
 from scipy.stats import binom
-from test_command_line import png_size, refused, rig, rows, run
 
 from rigdda import Fence, Site
 from rigdda.app.reports import stations

@@ -10,7 +10,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from test_command_line import png_size, refused, rig, rows, run
+from processes import png_size, refused, rig, rows, run
 
 import rigdda
 from rigdda import Site

@@ -139,7 +139,7 @@ def design(
     another problem (problem.json) is refused.
     """
     from rigdda.agents.designers.store import FILE, record_problem
-    from rigdda.app import jobs
+    from rigdda.app import design as job
     from rigdda.app.reports import band_report, interim_answer
     from rigdda.app.reports.folder import FILES, write
     from rigdda.app.uncertainty import ground_band
@@ -151,9 +151,9 @@ def design(
     record_problem(folder, problem, *FILES)
     band = None
     with recorded_run(folder, problem.site):
-        total = jobs.search_budget(problem, designer, budget) + CASES * verify
+        total = job.search_budget(problem, designer, budget) + CASES * verify
         with interim(total) as (tick, show_interim):
-            done, store = jobs.study(
+            done, store = job.design(
                 problem, designer, budget, seed, verify, folder, tick, precision,
                 lambda cases: show_interim(interim_answer.line(cases), interim_answer.table(cases)),
             )  # fmt: skip

@@ -70,7 +70,7 @@ def simulate(
     where it stopped.
     """
     import rigdda
-    from rigdda.app import jobs
+    from rigdda.app import simulate as job
     from rigdda.app.released import released
     from rigdda.app.reports import findings, simulation_folder, stations, tables
     from rigdda.app.reports.stations import Passing
@@ -95,13 +95,13 @@ def simulate(
     folder = folder_for(out, f"simulate-{where.name}", *simulation_folder.files(asked.tolist()))
     with recorded_run(folder, where), progress(releases) as tick:
         lines = simulation_folder.lines(where, asked)
-        found = jobs.simulate(where, barriers, seeds, event, lines.tolist(), folder, tick)
+        found = job.simulate(where, barriers, seeds, event, lines.tolist(), folder, tick)
         tick(releases, "tables and pictures")
         tables.write_outcomes(folder / "outcomes.csv", seeds, found.outcomes)
         found.run.save(folder / "run.npz")
         passing = Passing.of(where, barriers, event, found.passages)
         rows, rest = simulation_folder.write(folder, passing, barriers, asked)
-        jobs.forget(folder)
+        job.forget(folder)
     show(tables.outcomes(where, barriers, found.outcomes, stations.stopped(rest)))
     for line, table in stations.tables(rows):
         click.echo(line)

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
-from test_command_line import png_size, refused, rig, rows, run
+from processes import png_size, refused, rig, rows, run
 from test_report import Page
 
 import rigdda

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import enum
 import math
+from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
+from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import NamedTuple
 
@@ -31,7 +33,7 @@ from rigdda.model.settings import EARTH
 from rigdda.model.site import Site
 from rigdda.model.site_tables import Drawn
 from rigdda.model.terrain import Terrain
-from rigdda.releases import TOGETHER, Batch, as_site, by_size
+from rigdda.releases import TOGETHER, Batch, as_site, by_size, check_duration
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -503,6 +505,11 @@ def trajectories(
     Diverged
         If a simulation diverges.
 
+    Warns
+    -----
+    DoubtfulInput
+        If `motion.duration` cuts off more than one release in twenty, see `Outcome.cut_off`.
+
     Examples
     --------
     >>> import rigdda
@@ -512,9 +519,28 @@ def trajectories(
     >>> found.reached.mean()  # share of the blocks that come to the road
     >>> found.crossings([6.0]).energy  # of each block that passes 6 m, NaN for the others [J]
     """
-    return Trajectories.join(
-        list(trajectory_parts(site, layout, event, seeds, tolerance, threads, TOGETHER))
-    )
+    where = as_site(site)
+    numbers = _checked_seeds(seeds)
+    count = distribution.threads() if threads is None else check.integer("threads", threads, 1)
+    size = max(1, min(TOGETHER, len(numbers) // (4 * count)))
+    parts = trajectory_parts(where, layout, event, numbers, tolerance, count, size)
+    found = Trajectories.join(list(parts))
+    check_duration([where] * len(numbers), found.outcomes)
+    return found
+
+
+def _checked_seeds(seeds: Sequence[int]) -> tuple[int, ...]:
+    """Return the seeds of releases.
+
+    Raises
+    ------
+    BadInput
+        If there are none, or one is not a whole number of at least 0.
+    """
+    numbers = check.sequence("seeds", seeds, object, "whole numbers")
+    if not numbers:
+        raise BadInput("seeds", seeds, "give at least one seed")
+    return tuple(check.integer(f"seeds[{i}]", seed, 0) for i, seed in enumerate(numbers))
 
 
 def trajectory_parts(
@@ -543,13 +569,7 @@ def trajectory_parts(
     BadInput, Diverged
         As `trajectories` does; for invalid arguments before the first part is computed.
     """
-    where, built = as_site(site), as_layout(layout)
-    numbers = [
-        check.integer("seeds", seed, 0)
-        for seed in check.sequence("seeds", seeds, int, "whole numbers")
-    ]
-    if not numbers:
-        raise BadInput("seeds", seeds, "give at least one seed")
+    where, built, numbers = as_site(site), as_layout(layout), _checked_seeds(seeds)
     if event is not None:
         where.index(event)
     wide = check.number("tolerance", tolerance, 0.0, unit="m")
@@ -573,6 +593,10 @@ def _divided(
     return parts
 
 
+AHEAD = 4
+"""Number of parts for each thread that are computed before the first of them is taken."""
+
+
 def _computed(
     site: Site,
     layout: Layout,
@@ -593,11 +617,14 @@ def _computed(
         free.put(recorder)
         return found
 
+    todo, ahead = iter(parts), deque[Future[Trajectories]]()
     with ThreadPoolExecutor(threads) as pool:
-        ahead: list[Future[Trajectories]] = [pool.submit(work, part) for part in parts]
+        ahead.extend(pool.submit(work, part) for part in islice(todo, AHEAD * threads))
         try:
-            for future in ahead:
-                yield future.result()
+            while ahead:
+                found = ahead.popleft().result()
+                ahead.extend(pool.submit(work, part) for part in islice(todo, 1))
+                yield found
         finally:
             for future in ahead:
                 future.cancel()

@@ -29,11 +29,11 @@ from rigdda.barriers import (
     standing,
 )
 from rigdda.barriers.base import Reach, sliding_resistance, surfaces_below
-from rigdda.dynamics.history import History
 from rigdda.dynamics.monitors import chainages
 from rigdda.dynamics.run import Run
 from rigdda.dynamics.simulation import Simulation
 from rigdda.dynamics.single_block import MOST_CORNERS, Descent, SingleBlock
+from rigdda.dynamics.step_record import StepRecord
 from rigdda.dynamics.template import Template
 from rigdda.errors import BadInput, DoubtfulInput, Error
 from rigdda.geometry import clearly_convex, polygon_properties
@@ -128,8 +128,8 @@ class SingleReleases:
             road_area=barrier.area_beyond(self._site.road.start, outline),
         )
 
-    def ending(self, drawn: Drawn, history: History | None = None) -> Ending | None:
-        """Return how a release of a single block ends, and fill its history if one is given.
+    def ending(self, drawn: Drawn, record: StepRecord | None = None) -> Ending | None:
+        """Return how a release of a single block ends, and fill a record if one is given.
 
         Returns None if the release must be simulated as a scene, see `SingleBlock.run`.
         """
@@ -155,7 +155,7 @@ class SingleReleases:
             for bears, barrier in zip(resistances, barriers, strict=True)
         ]
         steps = max(1, round(site.motion.duration / dt))
-        found = arrays.run(block, meetings, forces, limits, drawn.stems, steps, history)
+        found = arrays.run(block, meetings, forces, limits, drawn.stems, steps, record)
         if found is None:
             return None
         return self._ending(found, area, block.density, barriers, resistances)
@@ -312,23 +312,23 @@ class Batch:
         """Return how a release ended, the name of its event and its width [m]."""
         return self.ending(drawn), drawn.event, drawn.width
 
-    def ending(self, drawn: Drawn, history: History | None = None) -> Ending:
-        """Return how a drawn release ends, and fill its history if one is given.
+    def ending(self, drawn: Drawn, record: StepRecord | None = None) -> Ending:
+        """Return how a drawn release ends, and fill a record if one is given.
 
         Raises the errors of `rigdda.release`.
         """
         if len(drawn.blocks) == 1 and self._single is not None:
-            ended = self._single.ending(drawn, history)
+            ended = self._single.ending(drawn, record)
             if ended is not None:
                 return ended
         duration = self._site.motion.duration
         # intermediate frames are needed to see a wall that slides or overturns and stands again
         moving = any(isinstance(barrier, GravityWall) for barrier in self._standing)
         simulation, every = self.simulation(self.scene(drawn)), EVERY if moving else duration
-        if history is None:
+        if record is None:
             run = simulation.run(duration, every)
         else:
-            run = history.run(simulation, duration, every)
+            run = record.run(simulation, duration, every)
         return ending(run, stations(self._site, run.scene.barriers), self._site.road.start)
 
     def scene(self, drawn: Drawn) -> Scene:

@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 from rigdda import check, distribution
 from rigdda.barriers import Barrier, Layout, as_layout
 from rigdda.dynamics import thinning
-from rigdda.dynamics.history import History
 from rigdda.dynamics.records import LEDGER
+from rigdda.dynamics.step_record import StepRecord
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
 from rigdda.measurement import Ending, holding, judge
@@ -379,7 +379,7 @@ def _kept(
     return kept[:count]
 
 
-class Recorder:
+class RecordedReleases:
     """Records releases of a site with a layout, one after another.
 
     Parameters
@@ -394,7 +394,7 @@ class Recorder:
 
     def __init__(self, site: Site, layout: Sequence[Barrier], tolerance: float):
         self._site, self._tolerance = site, tolerance
-        self._batch, self._history = Batch(site, layout), History()
+        self._batch, self._record = Batch(site, layout), StepRecord()
         self._ledger = np.zeros(len(LEDGER))
         self._number = {name: i for i, name in enumerate(site.event_names)}
 
@@ -405,11 +405,11 @@ class Recorder:
     def _one(self, seed: int, event: str | None) -> Trajectories:
         """Return the trajectories of one release."""
         drawn = self._site.draw(seed, event)
-        ended = self._batch.ending(drawn, self._history)
+        ended = self._batch.ending(drawn, self._record)
         outcome = judge(self._site, ended, drawn.event, drawn.width)
         paths = [self._path(i, width) for i, width in enumerate(np.sqrt(ended.areas).tolist())]
         width = np.sqrt(ended.areas)
-        bodies = self._history.loop.arrays.bodies.view(np.ndarray)[: len(paths)]
+        bodies = self._record.loop.arrays.bodies.view(np.ndarray)[: len(paths)]
         road = ended.log.passed[self._site.road.start]
         return Trajectories(
             seed=(seed,),
@@ -431,14 +431,14 @@ class Recorder:
 
     def _path(self, i: int, width: float) -> list[NDArray]:
         """Return the points of block i of the last release, in the order of `POINTS`."""
-        history = self._history
-        arrays, times = history.loop.arrays, history.times
-        motion = np.ascontiguousarray(history.frames[:, i])
+        record = self._record
+        arrays, times = record.loop.arrays, record.times
+        motion = np.ascontiguousarray(record.frames[:, i])
         body, energies = arrays.bodies[i : i + 1].copy(), np.empty(len(times))
         kinds = np.empty(len(times), dtype=np.int8)
         weight, radius = body["mass"][0] * EARTH, body["radius"][0]
         thinning.classify(
-            motion, body, arrays.parameters, history.stride, kinds, energies, self._ledger
+            motion, body, arrays.parameters, record.stride, kinds, energies, self._ledger
         )
         if self._tolerance > 0.0:
             heads = energies / weight
@@ -606,13 +606,13 @@ def _computed(
     threads: int,
 ) -> Iterator[Trajectories]:
     """Yield the trajectories of parts of the seeds, computed in threads."""
-    free: SimpleQueue[Recorder] = SimpleQueue()
+    free: SimpleQueue[RecordedReleases] = SimpleQueue()
 
     def work(seeds: Sequence[int]) -> Trajectories:
         try:
             recorder = free.get_nowait()
         except Empty:
-            recorder = Recorder(site, layout, tolerance)
+            recorder = RecordedReleases(site, layout, tolerance)
         found = recorder.releases(event, seeds)
         free.put(recorder)
         return found

@@ -29,7 +29,7 @@ LONGEST = {FIRST: 200.0, ALL: 1000.0}
 
 
 def layout(site: Site, repeat: int) -> Layout:
-    """Return a fence at the downhill end of the barrier zone, a centimetre further uphill a time."""
+    """Return a fence near the downhill end of the barrier zone, at a new place for each repeat."""
     return (Fence(site.barrier_zone.end - 0.5 - 0.01 * repeat, 3.0, energy_class=500),)
 
 

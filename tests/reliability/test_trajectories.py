@@ -9,7 +9,7 @@ import shapely
 
 import rigdda
 from rigdda import BadInput, Ditch, Embankment, Fence, GravityWall, Layout, Wall, sites
-from rigdda.dynamics import history
+from rigdda.dynamics import step_record
 from rigdda.model.settings import EARTH
 from rigdda.passages import passages
 from rigdda.trajectory import POINTS, Place, PointKind, Trajectories
@@ -215,7 +215,7 @@ def test_groups_have_a_path_for_each_block(monkeypatch):
     reached = np.bincount(found.release, found.reached) > 0
     assert reached.tolist() == [o.reached for o in found.outcomes]
     # a release that would need more memory is recorded at longer intervals
-    monkeypatch.setattr(history, "MEMORY", 48.0 * max(counts) * 300)
+    monkeypatch.setattr(step_record, "MEMORY", 48.0 * max(counts) * 300)
     coarse = rigdda.trajectories(BENCH, (), "group", range(3), tolerance=0.0)
     assert coarse.outcomes == found.outcomes
     assert np.diff(coarse.start).max() <= 302

@@ -1,4 +1,4 @@
-"""History of a release: the state of its blocks after every step."""
+"""Record of a release: the state of its blocks after every step."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ MEMORY = 64e6
 intervals."""
 
 
-class History:
+class StepRecord:
     """The states of the blocks of a release after every step, or at equal intervals.
 
-    A history can be used again; its arrays are then overwritten.
+    A record can be used again; its arrays are then overwritten.
 
     Attributes
     ----------

@@ -267,9 +267,10 @@ class Trajectories:
         Raises
         ------
         BadInput
-            If a chainage is not on the ground.
+            If a chainage is not a number or not on the ground.
         """
-        lines = np.atleast_1d(np.asarray(stations, dtype=np.float64))
+        asked = np.ravel(np.asarray(stations, dtype=object)).tolist()
+        lines = np.array([check.number("stations", x) for x in asked], dtype=np.float64)
         level = np.array([self.ground.height(x) for x in lines.tolist()])
         after = np.full((len(lines), len(self)), -1)
         for p in range(len(self)):

@@ -246,6 +246,9 @@ def test_bad_input(change, named):
 def test_bad_stations_and_sites(few):
     with pytest.raises(BadInput, match="stay on the terrain"):
         few.crossings([1e4])
+    with pytest.raises(BadInput, match="give a number"):
+        few.crossings(["road"])
+    assert few.crossings(31.0).time.shape == few.crossings([31.0]).time.shape == (1, 12)
     with pytest.raises(BadInput, match="site"):
         rigdda.trajectories("bench")  # type: ignore[arg-type]
     with pytest.raises(BadInput, match="size"):

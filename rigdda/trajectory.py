@@ -520,13 +520,12 @@ def trajectories(
     >>> found.reached.mean()  # share of the blocks that come to the road
     >>> found.crossings([6.0]).energy  # of each block that passes 6 m, NaN for the others [J]
     """
-    where = as_site(site)
-    numbers = _checked_seeds(seeds)
-    count = distribution.threads() if threads is None else check.integer("threads", threads, 1)
-    size = max(1, min(TOGETHER, len(numbers) // (4 * count)))
-    parts = trajectory_parts(where, layout, event, numbers, tolerance, count, size)
-    found = Trajectories.join(list(parts))
-    check_duration([where] * len(numbers), found.outcomes)
+    asked = _asked(site, layout, event, seeds, tolerance, threads)
+    count = len(asked.seeds)
+    size = max(1, min(TOGETHER, count // (4 * asked.threads)))
+    parts = [asked.seeds[i : i + size] for i in range(0, count, size)]
+    found = Trajectories.join(list(_computed(asked, parts)))
+    check_duration([asked.site] * count, found.outcomes)
     return found
 
 
@@ -555,8 +554,9 @@ def trajectory_parts(
 ) -> Iterator[Trajectories]:
     """Yield the trajectories of `trajectories` in parts, as soon as each is computed.
 
-    The parts are in the order of the seeds. Releases of events with many blocks are parts of their
-    own. Closing the iterator ends the computation after the current releases.
+    The parts are in the order of the seeds, but each release of an event with many blocks is a part
+    of its own and follows after all others. Closing the iterator ends the computation after the
+    parts that are being computed.
 
     Parameters
     ----------
@@ -570,42 +570,47 @@ def trajectory_parts(
     BadInput, Diverged
         As `trajectories` does; for invalid arguments before the first part is computed.
     """
+    asked = _asked(site, layout, event, seeds, tolerance, threads)
+    most = check.integer("size", size, 1)
+    jobs = [(asked.site, asked.layout, seed, event) for seed in asked.seeds]
+    large, small = by_size(jobs)
+    parts = [small[i : i + most] for i in range(0, len(small), most)] + [[i] for i in large]
+    return _computed(asked, [[asked.seeds[i] for i in part] for part in parts])
+
+
+class _Asked(NamedTuple):
+    """Checked arguments of `trajectories`."""
+
+    site: Site
+    layout: Layout
+    event: str | None
+    seeds: tuple[int, ...]
+    tolerance: float
+    threads: int
+
+
+def _asked(
+    site: Site,
+    layout: Sequence[Barrier],
+    event: str | None,
+    seeds: Sequence[int],
+    tolerance: float,
+    threads: int | None,
+) -> _Asked:
+    """Check the arguments of `trajectories`. Raises BadInput."""
     where, built, numbers = as_site(site), as_layout(layout), _checked_seeds(seeds)
     if event is not None:
         where.index(event)
     wide = check.number("tolerance", tolerance, 0.0, unit="m")
-    most = check.integer("size", size, 1)
     count = distribution.threads() if threads is None else check.integer("threads", threads, 1)
-    return _computed(where, built, event, _divided(where, built, event, numbers, most), wide, count)
-
-
-def _divided(
-    site: Site, layout: Layout, event: str | None, seeds: Sequence[int], most: int
-) -> list[list[int]]:
-    """Return the seeds in parts of at most `most`, those of large events in parts of their own."""
-    large = set(by_size([(site, layout, seed, event) for seed in seeds])[0])
-    parts: list[list[int]] = []
-    alone = True
-    for place, seed in enumerate(seeds):
-        if place in large or alone or len(parts[-1]) == most:
-            parts.append([])
-        alone = place in large
-        parts[-1].append(seed)
-    return parts
+    return _Asked(where, built, event, numbers, wide, count)
 
 
 AHEAD = 4
 """Number of parts for each thread that are computed before the first of them is taken."""
 
 
-def _computed(
-    site: Site,
-    layout: Layout,
-    event: str | None,
-    parts: Sequence[Sequence[int]],
-    tolerance: float,
-    threads: int,
-) -> Iterator[Trajectories]:
+def _computed(asked: _Asked, parts: Sequence[Sequence[int]]) -> Iterator[Trajectories]:
     """Yield the trajectories of parts of the seeds, computed in threads."""
     free: SimpleQueue[RecordedReleases] = SimpleQueue()
 
@@ -613,14 +618,14 @@ def _computed(
         try:
             recorder = free.get_nowait()
         except Empty:
-            recorder = RecordedReleases(site, layout, tolerance)
-        found = recorder.releases(event, seeds)
+            recorder = RecordedReleases(asked.site, asked.layout, asked.tolerance)
+        found = recorder.releases(asked.event, seeds)
         free.put(recorder)
         return found
 
     todo, ahead = iter(parts), deque[Future[Trajectories]]()
-    with ThreadPoolExecutor(threads) as pool:
-        ahead.extend(pool.submit(work, part) for part in islice(todo, AHEAD * threads))
+    with ThreadPoolExecutor(asked.threads) as pool:
+        ahead.extend(pool.submit(work, part) for part in islice(todo, AHEAD * asked.threads))
         try:
             while ahead:
                 found = ahead.popleft().result()

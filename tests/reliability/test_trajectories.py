@@ -202,6 +202,12 @@ def test_parts_follow_the_seeds(few):
     stopped = rigdda.trajectory_parts(BENCH, (), "block", range(10_000), size=2)
     assert next(stopped).seed == (0, 1)
     stopped.close()
+    names = [BENCH.pick(seed) for seed in range(60)]
+    mixed = list(rigdda.trajectory_parts(BENCH, (), None, range(60), size=50))
+    last = [seed for seed in range(60) if names[seed] == "slab"]
+    assert [seed for part in mixed for seed in part.seed if names[seed] == "slab"] == last
+    assert [part.seed for part in mixed[-len(last) :]] == [(seed,) for seed in last] != []
+    assert sorted(seed for part in mixed for seed in part.seed) == list(range(60))
 
 
 def test_groups_have_a_path_for_each_block(monkeypatch):

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from experiments.script import BLUE, GREY, RED, Number, draw, main, write
 from rigdda import Block, Scene, Settings, Simulation, Terrain
 from rigdda.geometry import polygon_properties
-from rigdda.validation.rotation import growth, spinning
+from rigdda.validation.motion import growth, spinning
 from rigdda.validation.scenes import Floats, ngon, rock
 
 DT = 5e-3

@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, main, write
 from rigdda.limit_equilibrium import Toppling
-from rigdda.validation import toppling
+from rigdda.validation import slopes
 from rigdda.validation.case import Lab, Metered
 from rigdda.validation.scenes import Floats
 
@@ -46,21 +46,23 @@ class Found(NamedTuple):
 
 def corners(sim: Metered) -> list[Floats]:
     """Return the corners of all columns, the slope rising to the left as in the paper [m]."""
-    return [sim.vertices(n) * (-1.0, 1.0) for n in range(len(toppling.HEIGHTS))]
+    return [sim.vertices(n) * (-1.0, 1.0) for n in range(len(slopes.COLUMN_HEIGHTS))]
 
 
 def compute() -> Found:
     """Relax the slope at both friction angles."""
-    lab = Lab(toppling.STEP_TIME)
-    normal, shear = toppling.base_forces(toppling.relax(lab, toppling.LIMIT_DEG))
-    sim = toppling.relax(lab, MODES_DEG)
+    lab = Lab(slopes.STATIC_STEP_TIME)
+    normal, shear = slopes.base_forces(slopes.relax(lab, slopes.LIMIT_DEG))
+    sim = slopes.relax(lab, MODES_DEG)
     before = corners(sim)
-    return Found(normal, shear, toppling.modes(sim, toppling.STEPS), before, corners(sim))
+    return Found(
+        normal, shear, slopes.toppling_modes(sim, slopes.STATIC_STEPS), before, corners(sim)
+    )
 
 
 def draw_geometry(axes: Axes) -> None:
     """Draw the slope (Fig. 6)."""
-    terrain, blocks = toppling.slope()
+    terrain, blocks = slopes.toppling_slope()
     _base(axes, terrain.points * (-1.0, 1.0))
     for n, block in enumerate(blocks):
         shape = block.vertices * (-1.0, 1.0)
@@ -81,7 +83,7 @@ def draw_forces(axes: Axes, computed: Floats, exact: Floats, title: str, colour:
 
 def draw_modes(axes: Axes, found: Found) -> None:
     """Draw how the columns move, exaggerated, in the colour of their mode (Fig. 8)."""
-    terrain, _ = toppling.slope()
+    terrain, _ = slopes.toppling_slope()
     _base(axes, terrain.points * (-1.0, 1.0))
     most = max(np.abs(b - a).max() for a, b in zip(found.before, found.after, strict=True))
     for old, new, mode in zip(found.before, found.after, found.modes, strict=True):
@@ -115,7 +117,7 @@ def rows(found: Found, exact: Toppling) -> list[dict[str, object]]:
 
 def run(quick: bool, out: Path) -> Number:
     """Compute, write and draw; `quick` has no effect, since the run takes seconds."""
-    found, exact = compute(), toppling.limit(toppling.LIMIT_DEG)
+    found, exact = compute(), slopes.limit_state(slopes.LIMIT_DEG)
 
     def picture(figure: Figure) -> None:
         (a, b), (c, d) = figure.subplots(2, 2)

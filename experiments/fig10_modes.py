@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 
 from experiments.script import BLUE, GREY, RED, Number, draw, interval, main, say, write
 from rigdda import Scene, Settings, Simulation, Site
-from rigdda.validation import ritchie
+from rigdda.validation import slopes
 from rigdda.validation.case import Lab
 from rigdda.validation.scenes import Floats
 
@@ -47,9 +47,9 @@ def site_of(slope_deg: int, restitution: float | None) -> Site:
 
 
 def descents(site: Site, slope_deg: int, releases: int) -> Floats:
-    """Return the descents of a slope, one row each with the fields of `ritchie.RitchieDescent`."""
+    """Return the descents of a slope, one row each with the fields of `slopes.RitchieDescent`."""
     lab = Lab(Settings().dt)
-    each = (ritchie.descend(lab, site, lab.random(slope_deg, i)) for i in range(releases))
+    each = (slopes.descend(lab, site, lab.random(slope_deg, i)) for i in range(releases))
     return np.array(list(each))
 
 
@@ -90,7 +90,7 @@ def draw_descents(axes: Axes, mode: str, contact: str) -> None:
     x, y = np.array(site.slope.points).T
     axes.fill_between(x, y, -2.0, color="#c9bca5", linewidth=0)
     for i, colour in zip(range(DRAWN), (BLUE, RED, GREY), strict=True):
-        block, _ = ritchie.pushed(site, lab.random(slope_deg, i))
+        block, _ = slopes.pushed(site, lab.random(slope_deg, i))
         sim = Simulation(Scene(site.profile, (block,), site.surfaces), Settings(dt=lab.dt))
         path = [sim.poses[0, :2]]
         for step in range(0, lab.steps(WATCHED), STRIDE):

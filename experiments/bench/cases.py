@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from experiments.bench.penetration import penetration
 from rigdda import Block, Scene, Site, Terrain
-from rigdda.validation import free_flight, rocking, slides, stacks
+from rigdda.validation import assemblies, motion, single_block
 from rigdda.validation.scenes import FLAT, box, incline, polygon, rock
 
 Floats = NDArray[np.float64]
@@ -96,7 +96,7 @@ class Case:
 
 def slide_error(scene: Scene, times: Floats, poses: Floats) -> float:
     """Return the relative error of the distance slid on 30 deg with 20 deg of friction."""
-    exact = slides.slide(30.0, 20.0, times[-1])
+    exact = single_block.slide(30.0, 20.0, times[-1])
     return abs(math.dist(poses[-1, 0, :2], poses[0, 0, :2]) / exact - 1.0)
 
 
@@ -107,7 +107,7 @@ def creep(scene: Scene, times: Floats, poses: Floats) -> float:
 
 def fall_error(scene: Scene, times: Floats, poses: Floats) -> float:
     """Return the relative error of the distance of a damped fall."""
-    exact = free_flight.fall(scene.damping, times[-1])[0]
+    exact = motion.fall(scene.damping, times[-1])[0]
     return abs((poses[0, 0, 1] - poses[-1, 0, 1]) / exact - 1.0)
 
 
@@ -130,7 +130,9 @@ def rocking_error(scene: Scene, times: Floats, poses: Floats) -> float:
     last = slowed[0] + 1
     a, b, c = np.polyfit(times[last - 2 : last + 1] - times[last], angle[last - 2 : last + 1], 2)
     after = 2.0 * c / (-b + math.sqrt(max(b * b - 4.0 * a * c, 0.0)))
-    exact = rocking.time_to_turn(rocking.HALF - tilt, rocking.HALF)
+    exact = single_block.time_to_turn(
+        single_block.DIAGONAL_ANGLE - tilt, single_block.DIAGONAL_ANGLE
+    )
     return abs((times[last] + after) / exact - 1.0)
 
 
@@ -200,15 +202,19 @@ def standing(name: str, blocks: tuple[Block, ...]) -> Case:
 
 def tilted(tilt: float) -> Scene:
     """Return the scene of a block 1 m wide and 4 m high on one corner."""
-    corners = [(0.0, 0.0), (rocking.WIDTH, 0.0), (rocking.WIDTH, rocking.HEIGHT)]
-    block = Block(polygon([*corners, (0.0, rocking.HEIGHT)], angle=tilt))
+    corners = [
+        (0.0, 0.0),
+        (single_block.ROCKING_WIDTH, 0.0),
+        (single_block.ROCKING_WIDTH, single_block.ROCKING_HEIGHT),
+    ]
+    block = Block(polygon([*corners, (0.0, single_block.ROCKING_HEIGHT)], angle=tilt))
     return Scene(Terrain(FLAT), (block,), rock(60.0))
 
 
 def single() -> tuple[Case, ...]:
     """Return the cases of one block."""
     falling = Scene(None, (box(),), rock(), damping=0.6)
-    tilts = tuple(map(tilted, rocking.TILTS))
+    tilts = tuple(map(tilted, single_block.INITIAL_TILTS))
     slide, hold = (incline(30.0, friction)[0] for friction in (20.0, 35.0))
     return (
         Case("slide", "relative error of the way [-]", (slide,), 2.0, 2.0, slide_error),
@@ -226,9 +232,9 @@ def all_cases() -> tuple[Case, ...]:
 
     return (
         *single(),
-        standing("stack-10", stacks.tower(rng(), 10)),
-        standing("stack-30", stacks.tower(rng(), 30)),
-        standing("mass-1-100", stacks.heavy_on_light(rng(), 100.0)),
+        standing("stack-10", assemblies.tower(rng(), 10)),
+        standing("stack-30", assemblies.tower(rng(), 30)),
+        standing("mass-1-100", assemblies.heavy_on_light(rng(), 100.0)),
         rockfall(20, 5, 1.0, 0.5),
         rockfall(120, 7, 0.75, 0.45),
         rockfall(480, 3, 0.7, 0.35),

@@ -32,7 +32,7 @@ from rigdda.app.uncertainty.fit import Floats, scores
 from rigdda.app.uncertainty.parameters import Parameter
 from rigdda.ground.grounds import GROUNDS
 from rigdda.validation.scenes import GRAVITY
-from rigdda.validation.slides import slab_scene
+from rigdda.validation.single_block import slab_scene
 
 LAWS: dict[str, dict[str, Any]] = {
     "none": {"rolling": 0.0, "restitution_speed": None},

@@ -11,7 +11,7 @@ from experiments.hard_cases.case import Case, History
 from experiments.hard_cases.stacks import STANDS, end_speed, on_level, stands
 from rigdda import Block, Scene, Terrain
 from rigdda.validation.scenes import GRAVITY, box, incline, masses, ngon, rock
-from rigdda.validation.slides import slide
+from rigdda.validation.single_block import slide
 
 HALF = math.radians(5.0)
 """Half of the angle of a sharp wedge [rad]."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from experiments.hard_cases.case import Case, History
 from rigdda import Block, Scene, Terrain
+from rigdda.validation.assemblies import CUBE_OFFSET, tower
 from rigdda.validation.scenes import FLAT, box, polygon, rock
-from rigdda.validation.stacks import OFFSET, tower
 
 STANDS = 0.02
 """Displacement over block size up to which a block is stable [-]."""
@@ -42,7 +42,7 @@ def on_level(*blocks: Block, friction_deg: float = 30.0) -> Scene:
 
 def cubes(densities: list[float], x: float = 0.0) -> tuple[Block, ...]:
     """Return a tower of one-metre cubes, slightly out of line, with these densities."""
-    offsets = np.random.default_rng(1).uniform(-OFFSET, OFFSET, len(densities))
+    offsets = np.random.default_rng(1).uniform(-CUBE_OFFSET, CUBE_OFFSET, len(densities))
     return tuple(
         box(x + dx, 0.5 + i, density=d)
         for i, (dx, d) in enumerate(zip(offsets, densities, strict=True))

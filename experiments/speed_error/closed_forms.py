@@ -16,7 +16,7 @@ from experiments.bench.engines import core as engine
 from experiments.speed_error.knobs import DEFAULT, STEP, STEPS, Choice, choices
 from rigdda.errors import BadInput, Diverged
 from rigdda.model.scene import Scene
-from rigdda.validation import arches, rolling, slides
+from rigdda.validation import assemblies, single_block
 from rigdda.validation.case import Case, Lab, Metered
 from rigdda.validation.scenes import block_size
 
@@ -130,5 +130,5 @@ def sweep_alone(case: Case) -> Iterator[Point]:
 
 def alone(quick: bool) -> list[Case]:
     """Return the cases of the validation suite that are computed without peers."""
-    modules = (slides, rolling, arches)
-    return [c for m in modules for c in m.CASES if c.name in (QUICK_ALONE if quick else ALONE)]
+    cases = (*single_block.SLIDING, *single_block.ROLLING, *assemblies.ARCHES)
+    return [c for c in cases if c.name in (QUICK_ALONE if quick else ALONE)]

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from rigdda import BadInput
 from rigdda.app.reports.tables import applies_not, empty_table, write_rows
 from rigdda.validation import CASES, Case, Convergence, Result, converge, evaluate
-from rigdda.validation.convergence import STEPS
-from rigdda.validation.free_flight import CASES as FLIGHT
+from rigdda.validation.case import STEPS
+from rigdda.validation.motion import FREE_FLIGHT
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -51,7 +51,7 @@ def validate(
     cases: Sequence[Case], seed: int, out: Path, tick: Callable[[int, str], None]
 ) -> tuple[list[Result], list[Convergence]]:
     """Run cases and the convergence of smooth cases, and write the tables after each of them."""
-    evaluate(FLIGHT[0])  # compile the kernels first, so that no case is charged for it
+    evaluate(FREE_FLIGHT[0])  # compile the kernels first, so that no case is charged for it
     results: list[Result] = []
     studies: list[Convergence] = []
     for done, case in enumerate(cases):

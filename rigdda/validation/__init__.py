@@ -4,8 +4,16 @@ A case is one computed experiment with one or more checked quantities, each with
 `suite.CASES` lists all cases; `rigdda validate` prints their results and the tests run them.
 """
 
-from rigdda.validation.case import Case, Check, Lab, Measured, Result, evaluate
-from rigdda.validation.convergence import Convergence, converge
+from rigdda.validation.case import (
+    Case,
+    Check,
+    Convergence,
+    Lab,
+    Measured,
+    Result,
+    converge,
+    evaluate,
+)
 from rigdda.validation.suite import CASES
 
 __all__ = [

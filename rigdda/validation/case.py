@@ -1,4 +1,4 @@
-"""Cases of the validation suite and their results."""
+"""Cases of the validation suite, their results, and the observed order of convergence."""
 
 from __future__ import annotations
 
@@ -194,3 +194,41 @@ def _result(name: str, check: Check, measured: Measured, cpu: float) -> Result:
     error = check.errors(computed, exact)
     k = int(error.argmax())
     return Result(name, check, float(exact[k]), float(computed[k]), float(error[k]), cpu)
+
+
+STEPS = (1e-2, 5e-3, 2.5e-3, 1.25e-3)
+"""Time steps [s]."""
+
+FLOOR = 1e-10
+"""Error below which rounding dominates [-]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Convergence:
+    """Errors of one checked quantity at the steps `STEPS`, and their order.
+
+    `order` is the slope of the least-squares line through the logarithms of error and step, over
+    the errors above rounding; NaN if there are fewer than two.
+    """
+
+    case: str
+    quantity: str
+    errors: tuple[float, ...]
+
+    @property
+    def order(self) -> float:
+        """Observed order of convergence [-]."""
+        points = [(s, e) for s, e in zip(STEPS, self.errors, strict=True) if FLOOR < e < math.inf]
+        if len(points) < 2:
+            return math.nan
+        step, error = np.log(np.array(points)).T
+        return float(np.polyfit(step, error, 1)[0])
+
+
+def converge(case: Case, seed: int = 0) -> tuple[Convergence, ...]:
+    """Run a case with all steps."""
+    runs = [evaluate(case, dt, seed) for dt in STEPS]
+    return tuple(
+        Convergence(case.name, check.quantity, tuple(run[i].error for run in runs))
+        for i, check in enumerate(case.checks)
+    )

@@ -17,7 +17,7 @@ from experiments.bench.levels import Row
 from experiments.bench.penetration import centroids, penetration
 from rigdda import Scene, Terrain
 from rigdda.geometry import is_convex, polygon_properties
-from rigdda.validation import free_flight, rocking, slides
+from rigdda.validation import motion, single_block
 from rigdda.validation.scenes import FLAT, box, rock
 
 
@@ -58,9 +58,9 @@ def moved(way: np.ndarray) -> np.ndarray:
 def test_exact_ways_have_no_error() -> None:
     times = np.linspace(0.0, 2.0, 5)
     fall = Scene(None, (box(),), rock(), damping=0.6)
-    ways = np.array([free_flight.fall(0.6, t)[0] for t in times])
+    ways = np.array([motion.fall(0.6, t)[0] for t in times])
     assert cases.fall_error(fall, times, moved(-ways)) == pytest.approx(0.0, abs=1e-12)
-    slid = np.array([slides.slide(30.0, 20.0, t) for t in times])
+    slid = np.array([single_block.slide(30.0, 20.0, t) for t in times])
     assert cases.slide_error(fall, times, moved(slid)) == pytest.approx(0.0, abs=1e-12)
     assert cases.slide_error(fall, times, moved(1.01 * slid)) == pytest.approx(0.01)
 
@@ -68,10 +68,10 @@ def test_exact_ways_have_no_error() -> None:
 @pytest.mark.parametrize("dt", [0.02, 0.005])
 def test_time_to_impact_follows_from_exact_poses(dt: float) -> None:
     """Integrate th'' = -p^2 sin(al - th) finely up to the impact, where the block stops."""
-    tilt = rocking.TILTS[0]
+    tilt = single_block.INITIAL_TILTS[0]
     fine, angle, rate, angles = 1e-5, tilt, 0.0, [tilt]
     for _ in range(90_000):
-        rate -= fine * rocking.PULL * math.sin(rocking.HALF - angle)
+        rate -= fine * single_block.PULL * math.sin(single_block.DIAGONAL_ANGLE - angle)
         angle, rate = (angle + fine * rate, rate) if angle + fine * rate > 0.0 else (0.0, 0.0)
         angles.append(angle)
     poses = np.zeros((round(0.9 / dt), 1, 3))

@@ -16,7 +16,7 @@ from experiments.speed_error.highway import Budget, Sample
 from experiments.speed_error.tables import bias, closed_table, total_error
 from rigdda import Block, Scene, Settings, Terrain
 from rigdda.validation.scenes import FLAT, box, rock
-from rigdda.validation.slides import CASES as SLIDES
+from rigdda.validation.single_block import SLIDING
 
 SLIDE = single()[0]
 
@@ -95,7 +95,7 @@ def test_slides_are_exact_at_every_choice():
     points = list(closed_forms.sweep(SLIDE))
     assert max(p.error for p in points) < 1e-5  # with a single open-close iteration
     assert "| step 0.01 |" in closed_table(points)
-    newmark = next(c for c in SLIDES if c.name == "newmark")
+    newmark = next(c for c in SLIDING if c.name == "newmark")
     default = next(p for p in closed_forms.sweep_alone(newmark) if p.default)
     assert default.error < 1e-3
 

@@ -25,8 +25,7 @@ from rigdda import (
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.dynamics.constants import ASLEEP, RETIRED, SUBSTEPS
 from rigdda.dynamics.monitors import FAILED
-from rigdda.validation.case import Lab
-from rigdda.validation.fences import (
+from rigdda.validation.barriers import (
     CAPACITY,
     ELONGATION,
     FENCE,
@@ -34,14 +33,15 @@ from rigdda.validation.fences import (
     Bar,
     Lean,
     blow,
+    braking_path,
     outcome,
-    path,
     plate_mass,
     square_mass,
     strike,
     together,
     volley,
 )
+from rigdda.validation.case import Lab
 
 GROUND = Terrain(FLAT)
 
@@ -92,7 +92,9 @@ def test_a_central_blow_moves_it_by_its_energy_over_the_force(share, dt):
     sim = in_motion(volley((share,)), dt)
     run = sim.run(2.0)
     exact = outcome((share,))
-    assert path(run) == pytest.approx(exact.path, abs=margin(exact.path, speed_of(share), dt))
+    assert braking_path(run) == pytest.approx(
+        exact.path, abs=margin(exact.path, speed_of(share), dt)
+    )
     assert run.absorbed[0] == pytest.approx(share * CAPACITY, rel=1e-3)
     assert math.isinf(run.failure(0))
     assert np.abs(run.velocities[-1]).max() < 0.01
@@ -102,7 +104,7 @@ def test_a_central_blow_moves_it_by_its_energy_over_the_force(share, dt):
 def test_a_blow_from_the_downhill_side_does_not_move_it():
     sim = in_motion(volley((0.5,), uphill=True), 5e-3)
     run = sim.run(2.0)
-    assert path(run) == 0.0 and math.isinf(run.failure(0))
+    assert braking_path(run) == 0.0 and math.isinf(run.failure(0))
     assert np.abs(run.velocities[-1]).max() < 0.01
     assert open_ledger(sim, 0.5 * CAPACITY) == pytest.approx(0.0, abs=1e-4 * CAPACITY)
 
@@ -112,7 +114,7 @@ def test_it_holds_a_block_of_its_class_and_not_one_of_a_tenth_more(dt):
     """Some of the energy goes into the plate, so that of its class is within the capacity."""
     held = in_motion(volley((1.0,)), dt).run(2.0)
     assert math.isinf(held.failure(0)) and abs(held.velocities[-1, 0, 0]) < 0.01
-    assert path(held) < ELONGATION
+    assert braking_path(held) < ELONGATION
     passed = in_motion(volley((1.1,)), dt).run(2.0)
     assert math.isfinite(passed.failure(0)) and passed.poses[-1, 0, 0] > ELONGATION
 
@@ -133,11 +135,11 @@ def test_hits_add_up_until_the_capacity_is_spent(shares, dt):
         (event,) = failed
         assert (event["block"] + 1, event["target"]) == (exact.breaking, 0)
         assert event["time"] == run.failure(0)
-        assert path(run) == pytest.approx(ELONGATION, rel=1e-12)
+        assert braking_path(run) == pytest.approx(ELONGATION, rel=1e-12)
         assert sim.loop.arrays.bodies["status"][-1] == RETIRED
     else:
         assert len(failed) == 0
-        assert path(run) == pytest.approx(exact.path, abs=late)
+        assert braking_path(run) == pytest.approx(exact.path, abs=late)
     assert len(run.hits(0)) == (exact.breaking or len(shares))
     spent = FENCE.braking_force * late  # what the brake may miss
     kept = 0.5 * square_mass() * (run.velocities[-1, :, 0] ** 2).sum()
@@ -169,7 +171,7 @@ def test_no_block_gets_through_between_two_steps(dt):
             block = box(x, 2.0, side, side, velocity=(speed, 0.0, 0.0))
             scene = Scene(GROUND, (block,), rock(), barriers=(fence,), gravity=0.0)
             run = in_motion(scene, dt).run(1.0)
-            assert path(run) == pytest.approx(exact, abs=margin(exact, speed, dt))
+            assert braking_path(run) == pytest.approx(exact, abs=margin(exact, speed, dt))
 
 
 @at_all_steps
@@ -265,7 +267,7 @@ def shove(row: int, shots: tuple[tuple[float, float], ...], dt: float) -> tuple[
 @pytest.mark.parametrize("row", [1, 3, 6])
 def test_a_row_that_is_struck_at_its_end_goes_on_together(row, dt):
     run, exact, speed = shove(row, ((-4.0 - row, 10.0),), dt)
-    assert path(run) == pytest.approx(exact, abs=margin(exact, speed / (row + 1), dt))
+    assert braking_path(run) == pytest.approx(exact, abs=margin(exact, speed / (row + 1), dt))
     assert run.absorbed[0] == pytest.approx(1.3e5 / (row + 1), rel=0.03)
 
 
@@ -273,7 +275,7 @@ def test_a_row_that_is_struck_at_its_end_goes_on_together(row, dt):
 @pytest.mark.parametrize("gap", [0.0, 1e-3])
 def test_a_train_of_blocks_gives_a_fence_all_it_has(gap, dt):
     run, exact, speed = shove(0, tuple((-3.0 - (1.0 + gap) * i, 10.0) for i in range(3)), dt)
-    assert path(run) == pytest.approx(exact, abs=margin(exact, speed, dt))
+    assert braking_path(run) == pytest.approx(exact, abs=margin(exact, speed, dt))
     assert run.absorbed[0] == pytest.approx(3.9e5, rel=2e-3)
 
 
@@ -283,7 +285,7 @@ def test_a_fast_block_strikes_one_that_hits_the_fence_in_the_same_step(ahead, dt
     fast = 20.0
     shots = ((-0.5 - 0.3 * ahead * dt, ahead), (-1.5 - 0.3 * fast * dt, fast))
     run, exact, speed = shove(0, shots, dt)
-    assert path(run) == pytest.approx(exact, abs=margin(exact, speed, dt))
+    assert braking_path(run) == pytest.approx(exact, abs=margin(exact, speed, dt))
 
 
 @at_all_steps
@@ -292,7 +294,7 @@ def test_blocks_side_by_side_are_stopped_as_one(dt):
     scene = Scene(GROUND, blocks, rock(0.0), barriers=(STRONG,), gravity=0.0)
     run = in_motion(scene, dt).run(3.0)
     exact = together(STRONG, blocks, 3 * 26e3)
-    assert path(run) == pytest.approx(exact, abs=margin(exact, 10.0, dt))
+    assert braking_path(run) == pytest.approx(exact, abs=margin(exact, 10.0, dt))
 
 
 SLOPE = Terrain([(-60.0, 45.0), (0.0, 0.0), (60.0, 0.0)])
@@ -324,7 +326,7 @@ def groups(dt: float) -> np.ndarray:
         run = in_motion(scene, dt).run(8.0)
         (fence,) = scene.barriers
         beyond = (run.poses[-1, :, 0] > fence.end + fence.elongation).mean()
-        found.append((beyond, path(run) / fence.elongation, math.isfinite(run.failure(0))))
+        found.append((beyond, braking_path(run) / fence.elongation, math.isfinite(run.failure(0))))
     values = np.array(found, dtype=float)
     half = 1.96 * values.std(axis=0, ddof=1) / math.sqrt(number)
     half[2] = max(half[2], 3.0 / number)
@@ -368,7 +370,7 @@ def test_a_row_on_a_slope_moves_it_by_what_its_thrust_exceeds_the_force(share, s
     """Less than F moves it not at all; more accelerates it by the difference."""
     lean = Lean(slope_deg, share)
     run = in_motion(lean.scene, dt).run(1.0)
-    assert path(run) == pytest.approx(lean.path(1.0), abs=3e-3 + 1.4 * dt)
+    assert braking_path(run) == pytest.approx(lean.path(1.0), abs=3e-3 + 1.4 * dt)
     assert math.isinf(run.failure(0))
 
 
@@ -395,7 +397,7 @@ def test_it_fails_under_more_than_its_force_and_holds_less_for_good(share, gap, 
     assert early.absorbed[0] < 0.02 * fence.capacity
     late = sim.run(7.0)
     assert math.isinf(late.failure(0))
-    assert path(late) == pytest.approx(0.0, abs=1e-4)
+    assert braking_path(late) == pytest.approx(0.0, abs=1e-4)
     assert (sim.loop.arrays.bodies["status"] == ASLEEP).all()
     thrust = 4 * 2600.0 * GRAVITY * math.tan(math.radians(40.0))
     assert late.thrust[0] == pytest.approx(thrust, rel=0.1)
@@ -427,7 +429,7 @@ def test_everything_comes_to_rest_and_sleeps(dt):
     sim = in_motion(scene, dt)
     sim.run(4.0)
     assert (sim.loop.arrays.bodies["status"] == ASLEEP).all()
-    assert path(sim.run(2.0)) == 0.0
+    assert braking_path(sim.run(2.0)) == 0.0
 
 
 # over the top
@@ -439,7 +441,7 @@ def test_what_comes_over_the_top_is_not_braked(dt):
     scene = Scene(GROUND, (high,), rock(), barriers=(Fence(0.0, 2.0, CAPACITY),))
     run = in_motion(scene, dt).run(0.4)
     assert run.poses[-1, 0, 0] > 2.0
-    assert run.absorbed[0] == 0.0 and path(run) == 0.0
+    assert run.absorbed[0] == 0.0 and braking_path(run) == 0.0
 
 
 @at_all_steps
@@ -453,13 +455,13 @@ def test_it_is_lower_by_what_it_gave_way(dt):
         scene = Scene(GROUND, (first, second), rock(), barriers=(fence,), gravity=0.0)
         sim = in_motion(scene, dt)
         early = sim.run(2.0)
-        top = fence.height * (1.0 - 0.5 * path(early) / fence.elongation)
+        top = fence.height * (1.0 - 0.5 * braking_path(early) / fence.elongation)
         computed = sim.loop.arrays.outlines.corner["y"][2, :4].max()
         assert computed == pytest.approx(top, abs=1e-6)
         assert early.outline(0)[:, 1].max() == pytest.approx(top, abs=1e-6)
-        assert fence.left_height(path(early)) == pytest.approx(top, abs=1e-6)
+        assert fence.left_height(braking_path(early)) == pytest.approx(top, abs=1e-6)
         exact = blow(mass, speed_of(share), fence).braked / fence.braking_force
-        assert path(early) == pytest.approx(exact, abs=margin(exact, speed_of(share), dt))
+        assert braking_path(early) == pytest.approx(exact, abs=margin(exact, speed_of(share), dt))
         late = sim.run(2.5)
         assert (late.velocities[-1, 1, 0] == pytest.approx(10.0)) == passes
 
@@ -489,7 +491,7 @@ def test_a_fence_that_moves_on_by_itself_fails_like_any_other(dt):
         run = sim.run(1.0)
         spent = sim.loop.arrays.bodies["status"][-1] == RETIRED
         assert spent == math.isfinite(run.failure(0)), seed
-        assert spent == (path(run) == pytest.approx(fence.elongation, rel=1e-12)), seed
+        assert spent == (braking_path(run) == pytest.approx(fence.elongation, rel=1e-12)), seed
 
 
 def test_without_an_elongation_it_has_that_of_the_next_class():

@@ -11,8 +11,8 @@ from msgspec.structs import replace
 from physics.helpers import FLAT, GRAVITY, box, rock
 from rigdda import Block, Fence, GravityWall, Run, Scene, Simulation, Site, Terrain, Wall, release
 from rigdda.releases import release_many
+from rigdda.validation.barriers import FACE, LOADING_TIME, Push, displacement
 from rigdda.validation.case import Lab
-from rigdda.validation.gravity_walls import DURATION, FACE, Push, displacement
 
 
 @pytest.mark.parametrize("slope_deg", [20.0, 30.0])
@@ -27,7 +27,9 @@ def test_slides_on_a_slope_steeper_than_friction(slope_deg):
         x, y, turn = displacement(Lab(5e-3), scene)
         assert turn == pytest.approx(0.0, abs=1e-3)
         if slides:  # s = 1/2 g (sin - cos tan phi) t^2
-            way = 0.5 * GRAVITY * math.sin(math.radians(slope_deg)) * (1.0 - share) * DURATION**2
+            way = (
+                0.5 * GRAVITY * math.sin(math.radians(slope_deg)) * (1.0 - share) * LOADING_TIME**2
+            )
             assert math.hypot(x, y) == pytest.approx(way, rel=0.01)
         else:
             assert math.hypot(x, y) < 1e-4

@@ -12,7 +12,7 @@ from rigdda import Block, Scene, Settings, Simulation, Site, Surface, Terrain
 from rigdda.dynamics.constants import MOST_SWEEPS, OPEN, REST
 from rigdda.dynamics.records import CONTACTS
 from rigdda.validation.scenes import box, incline
-from rigdda.validation.slides import slide
+from rigdda.validation.single_block import slide
 
 FALL = 3.0
 """Simulated time in which the rock of `quick` falls [s]."""

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from physics.helpers import FLAT, GRAVITY, polygon, rock
 from rigdda import Block, Scene, Settings, Simulation, Terrain
 from rigdda.validation.case import Lab
-from rigdda.validation.rolling import roll, wheel
+from rigdda.validation.single_block import roll, wheel
 
 
 def steady_roll(sides: int, share: float) -> tuple[float, float]:

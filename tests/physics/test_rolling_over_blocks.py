@@ -10,7 +10,7 @@ import pytest
 from physics.helpers import ngon, polygon, rock
 from physics.steps import STEPS
 from rigdda import Block, Scene, Settings, Simulation, Terrain
-from rigdda.validation.rolling import wheel
+from rigdda.validation.single_block import wheel
 
 SLOPE, RATE, TIME = math.radians(10.0), 2.0, 4.0
 """Slope [rad], first rate of rotation [rad/s] and time [s]."""

@@ -1,7 +1,7 @@
 """Rolling resistance: sliding keeps to Coulomb, rolling is slowed by at most c N R in each contact.
 
 R = sqrt(2 I/m). The reference solutions are solved for accelerations and forces as they stand, not
-in closed form, so that they do not share an algebra with `rigdda.validation.rolling`.
+in closed form, so that they do not share an algebra with `rigdda.validation.single_block`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from physics.helpers import GRAVITY, box, ngon, polygon, rough
 from physics.steps import STEPS, accepted, mechanical
 from rigdda import Block, Scene, Settings, Simulation, Surface, Terrain
-from rigdda.validation.rolling import wheel
+from rigdda.validation.single_block import wheel
 
 
 def simulate(

@@ -24,7 +24,7 @@ from rigdda.geometry import overlap
 from rigdda.measurement import measure, stations, watch
 from rigdda.model.site_generator import fallen
 from rigdda.model.site_tables import Scatter
-from rigdda.validation import toppling
+from rigdda.validation import slopes
 
 NAMES = sites.names()
 EVENTS = [(name, event) for name in NAMES for event in Site.load(name).event_names]
@@ -112,7 +112,7 @@ def test_sites_of_ritchie_differ_in_their_angle_only():
 
 def test_toppling_site_is_the_slope_of_goodman_and_bray():
     """Mirrored, so that it falls to the right, with the heel of the toe column at (140, 10)."""
-    _, exact = toppling.slope()
+    _, exact = slopes.toppling_slope()
     blocks = Site.load("toppling").realise().blocks
     assert len(blocks) == len(exact) == 16
     for block, column in zip(blocks, exact, strict=True):

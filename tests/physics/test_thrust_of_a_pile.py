@@ -9,7 +9,7 @@ import pytest
 
 from physics.helpers import GRAVITY, masses, rock
 from rigdda import Block, Scene, Settings, Simulation, Surface, Terrain
-from rigdda.validation.silos import COLUMNS, WIDTH, silo
+from rigdda.validation.assemblies import POLYGONS_PER_LAYER, SILO_WIDTH, silo
 
 LAYERS, FILLINGS, TOP = 11, 24, 8.0
 """Layers of blocks of 0.3 m, number of fillings that are averaged, and height of the walls [m]."""
@@ -24,7 +24,7 @@ def between_fixed_blocks(seed: int) -> Scene:
             fixed=True,
             surface="wall",
         )
-        for x in (-1.0, WIDTH)
+        for x in (-1.0, SILO_WIDTH)
     ]
     smooth = Surface(0.0)
     return Scene(
@@ -37,7 +37,7 @@ def between_fixed_blocks(seed: int) -> Scene:
 
 def thrust(dt: float, seed: int) -> float:
     """Return the mean thrust on a wall in the sixth second over that of a fluid [-]."""
-    scene, count = between_fixed_blocks(seed), LAYERS * COLUMNS
+    scene, count = between_fixed_blocks(seed), LAYERS * POLYGONS_PER_LAYER
     sim = Simulation(scene, Settings(dt=dt, sleeping=False))
     sim.step(round(5.0 / dt))
     forces = []
@@ -48,7 +48,7 @@ def thrust(dt: float, seed: int) -> float:
         forces.append(0.5 * found["normal_force"][fixed].sum())
     depth = max(sim.vertices(i)[:, 1].max() for i in range(count))
     weight = GRAVITY * masses(scene)[0][:count].sum()
-    return float(np.mean(forces) * 2.0 * WIDTH / (weight * depth))
+    return float(np.mean(forces) * 2.0 * SILO_WIDTH / (weight * depth))
 
 
 @pytest.mark.slow

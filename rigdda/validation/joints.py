@@ -1,21 +1,29 @@
-"""A block slides over flush joints between other blocks: on a plane, along a wall, in a slot.
+"""Joints between blocks: sliding over flush joints, and the strength of a joint.
 
-The sides of the blocks must not stop it, so that it moves as on one smooth face.
+A block slides over flush joints between other blocks: on a plane, along a wall, in a slot. The
+sides of the blocks must not stop it, so that it moves as on one smooth face.
+
+A joint breaks where a linear traction along it exceeds its strength. It is loaded in tension,
+pulled with an eccentricity e, which it resists up to N = sigma_t L / (1 + 6 e / L); and in shear,
+pushed at its level or above it, up to S = c L + N tan phi.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from rigdda.model.scene import Block, Scene, Terrain
+from rigdda.model.loads import PointLoad
+from rigdda.model.scene import Block, Scene, Surface, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured
-from rigdda.validation.scenes import GRAVITY, Floats, box, rock, shifts
+from rigdda.validation.scenes import FLAT, GRAVITY, Floats, box, masses, rock, shifts
 
-STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
-TIME = 1.6
+SLIDE_STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
+SLIDE_TIME = 1.6
 """Duration of a slide [s]."""
 
 COURSE = 30
@@ -39,7 +47,7 @@ class JointSlide(NamedTuple):
         slope = math.radians(self.slope)
         drag = math.cos(slope) * math.tan(math.radians(self.friction))
         pull = self.gravity * (math.sin(slope) - drag)
-        time = min(TIME, -self.speed / pull) if pull < 0.0 else TIME
+        time = min(SLIDE_TIME, -self.speed / pull) if pull < 0.0 else SLIDE_TIME
         return self.speed * time + 0.5 * pull * time**2
 
     def scene(self) -> tuple[Scene, Floats]:
@@ -71,11 +79,11 @@ def fall_along(friction_deg: float, clearance: float | None) -> Scene:
 def measure_slide(lab: Lab, slide: JointSlide) -> tuple[Measured]:
     """Simulate a slide over the row with all steps."""
     ways = []
-    for dt in STEPS:
+    for dt in SLIDE_STEPS:
         scene, down = slide.scene()
         sim = lab.simulate(scene, dt)
         start = sim.poses
-        sim.step(round(TIME / dt))
+        sim.step(round(SLIDE_TIME / dt))
         ways.append(shifts(start, sim.poses, down))
     return (Measured(ways, slide.way()),)
 
@@ -83,7 +91,7 @@ def measure_slide(lab: Lab, slide: JointSlide) -> tuple[Measured]:
 def measure_fall(lab: Lab, clearance: float | None) -> tuple[Measured]:
     """Simulate falls along a wall or in a slot with all steps, smooth and rough."""
     ways = []
-    for dt in STEPS:
+    for dt in SLIDE_STEPS:
         for friction in (0.0, 30.0):
             sim = lab.simulate(fall_along(friction, clearance), dt)
             sim.step(round(1.2 / dt))
@@ -104,7 +112,7 @@ def fall_case(name: str, clearance: float | None) -> Case:
     return Case(name, (check,), lambda lab: measure_fall(lab, clearance))
 
 
-CASES = (
+SLIDES_OVER_JOINTS = (
     slide_case("joints-35-20", JointSlide(35.0, 20.0)),
     slide_case("joints-35-0", JointSlide(35.0, 0.0)),
     slide_case("joints-0-20", JointSlide(0.0, 20.0, 10.0)),
@@ -114,4 +122,77 @@ CASES = (
     slide_case("joints-free-0-20", JointSlide(0.0, 20.0, 6.0, free=True)),
     fall_case("joints-wall", None),
     fall_case("joints-slot", CLEARANCE),
+)
+
+
+STRENGTH_STEPS = (1e-3, 5e-3, 1e-2)
+FRICTION = 30.0
+"""Friction angle of the joint [deg]."""
+
+STRENGTH = 1e5
+"""Tensile strength of the joint; its cohesion is a tenth of it [Pa]."""
+
+ECCENTRICITIES = (0.0, 0.1, 0.25, 0.5)
+"""Eccentricities of the pull over the joint length of 1 m [-]."""
+
+ARMS = (0.0, 0.5, 1.0)
+"""Heights of the push above the joint of a block 2 m high [m]."""
+
+PULL_TIME = 0.3
+"""Time after which a broken joint has visibly separated [s]."""
+
+HALVINGS = 6
+
+
+def breaking(lab: Lab, scene: Scene, dt: float) -> bool:
+    """Return whether the block of a scene moves."""
+    sim = lab.simulate(scene, dt)
+    start = sim.poses
+    sim.step(round(PULL_TIME / dt))
+    return bool(np.abs(sim.poses - start).max() > 1e-3)
+
+
+def pulled(eccentricity: float, share: float) -> Scene:
+    """Return a block on a joint, pulled upwards with a fraction of the breaking force."""
+    block = box(0.0, 0.5)
+    weight = GRAVITY * float(masses(Scene(None, (block,)))[0][0])
+    pull = share * STRENGTH / (1.0 + 6.0 * eccentricity)
+    # pull and compensation of the weight, combined into one eccentric force
+    load = PointLoad(0, (pull * eccentricity / (pull + weight), 1.0), (0.0, pull + weight))
+    surface = Surface(FRICTION, cohesion=100.0 * STRENGTH, tension=STRENGTH)
+    return Scene(Terrain(FLAT), (block,), {"rock": surface}, loads=(load,))
+
+
+def pushed(arm: float, share: float) -> Scene:
+    """Return a block of 1 by 2 m on a joint, pushed by a fraction of the breaking force."""
+    block = box(0.0, 1.0, 1.0, 2.0)
+    weight = GRAVITY * float(masses(Scene(None, (block,)))[0][0])
+    push = share * (0.1 * STRENGTH + weight * math.tan(math.radians(FRICTION)))
+    surface = Surface(FRICTION, cohesion=0.1 * STRENGTH, tension=10.0 * STRENGTH)
+    load = PointLoad(0, (0.0, arm), (push, 0.0))
+    return Scene(Terrain(FLAT), (block,), {"rock": surface}, loads=(load,))
+
+
+def strength(lab: Lab, build: Callable[[float], Scene], dt: float) -> float:
+    """Return the breaking force of a joint over the closed form, by bisection."""
+    low, high = 0.25, 4.0
+    for _ in range(HALVINGS):
+        share = math.sqrt(low * high)
+        low, high = (low, share) if breaking(lab, build(share), dt) else (share, high)
+    return math.sqrt(low * high)
+
+
+def measure_strength(
+    lab: Lab, build: Callable[[float, float], Scene], places: tuple[float, ...]
+) -> tuple[Measured]:
+    """Break joints with all steps."""
+    found = [strength(lab, partial(build, x), dt) for x in places for dt in STRENGTH_STEPS]
+    return (Measured(found, 1.0),)
+
+
+TENSION = Check("pull, e 0-0.5 L", "sigma_t L / (1 + 6 e / L)", "-", 0.04, "relative")
+SHEAR = Check("push, height 0-1 m", "c L + N tan phi", "-", 0.04, "relative")
+JOINT_STRENGTH = (
+    Case("joint-tension", (TENSION,), lambda lab: measure_strength(lab, pulled, ECCENTRICITIES)),
+    Case("joint-shear", (SHEAR,), lambda lab: measure_strength(lab, pushed, ARMS)),
 )

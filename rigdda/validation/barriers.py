@@ -1,9 +1,13 @@
-"""A fence decelerates bodies with a constant force and fails at the end of its elongation.
+"""Barriers under impact and load: thin walls, gravity walls and fences.
 
-The plate of the fence, with mass m_p, takes part in every impact, which is plastic. A block of mass
-m and speed v that hits it squarely continues together with it at m v / (m + m_p). Both are stopped
-over the distance K / F, where K is the kinetic energy of both after the impact and F the braking
-force.
+A thin wall stops fast blocks; no block tunnels through it.
+
+A rock leans on a gravity wall, which slides or overturns at its static limit load.
+
+A fence decelerates bodies with a constant force and fails at the end of its elongation. The plate
+of the fence, with mass m_p, takes part in every impact, which is plastic. A block of mass m and
+speed v that hits it squarely continues together with it at m v / (m + m_p). Both are stopped over
+the distance K / F, where K is the kinetic energy of both after the impact and F the braking force.
 """
 
 from __future__ import annotations
@@ -14,13 +18,191 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigdda.barriers import Fence
+from rigdda.barriers import Fence, GravityWall
 from rigdda.barriers.fence import MASS
 from rigdda.dynamics.monitors import FAILED
 from rigdda.dynamics.run import Run
-from rigdda.model.scene import Block, Scene, Surface, Terrain
+from rigdda.geometry import polygon_properties
+from rigdda.model.scene import Block, Scene, Surface, Terrain, Wall
 from rigdda.validation.case import Case, Check, Lab, Measured
-from rigdda.validation.scenes import FLAT, GRAVITY, box, kinetic_energy, masses, polygon, rock
+from rigdda.validation.scenes import (
+    FLAT,
+    GRAVITY,
+    Floats,
+    box,
+    kinetic_energy,
+    masses,
+    polygon,
+    rock,
+    rough,
+)
+
+WALL = Wall(x=10.0, height=100.0, thickness=0.2)
+"""The wall, too high for any of the blocks to fly over it."""
+
+SHOTS = 200
+SHOT_DURATION = 0.3
+"""Longest flight time to the wall [s]."""
+
+
+def shot(rng: np.random.Generator) -> Scene:
+    """Return a random convex block that flies at the wall at 5 to 100 m/s."""
+    radius = rng.uniform(0.3, 1.5)
+    corners = rough(rng, int(rng.integers(3, 9)), radius)
+    speed, climb = rng.uniform(5.0, 100.0), np.radians(rng.uniform(-45.0, 45.0))
+    velocity = (speed * np.cos(climb), speed * np.sin(climb), rng.uniform(-20.0, 20.0))
+    away = 1.5 * radius + rng.uniform(0.05, SHOT_DURATION) * velocity[0]
+    corners = polygon(corners, (WALL.x - away, 50.0), rng.uniform(0.0, 2.0 * np.pi))
+    surfaces = rock(30.0, rng.uniform(0.0, 0.9))
+    return Scene(Terrain(FLAT), (Block(corners, velocity=velocity),), surfaces, barriers=(WALL,))
+
+
+def fly_at_wall(lab: Lab, scene: Scene) -> tuple[bool, bool, float]:
+    """Return whether a block arrives, whether its centroid passes, and its corner depth [m]."""
+    sim = lab.simulate(scene)
+    deepest, centre = 0.0, 0.0
+    for _ in range(lab.steps(SHOT_DURATION + 0.5)):
+        sim.step()
+        deepest = max(deepest, float(sim.vertices(0)[:, 0].max()) - WALL.x)
+        centre = max(centre, float(sim.poses[0, 0]))
+    energy = sim.energy()
+    arrived = energy.impact + energy.friction < 0.0  # an impact on the wall takes energy
+    return arrived, centre > WALL.x, deepest
+
+
+def measure_shots(lab: Lab) -> tuple[Measured, Measured, Measured]:
+    """Simulate all shots."""
+    arrived, passed, deepest = zip(
+        *(fly_at_wall(lab, shot(lab.random(i))) for i in range(SHOTS)), strict=True
+    )
+    return Measured(sum(arrived), SHOTS), Measured(sum(passed)), Measured(deepest)
+
+
+WALL_CHECKS = (
+    Check("arrive", "all", "-", 0.0, "absolute"),
+    Check("centroids pass", "none: rigid", "-", 0.0, "bound"),
+    # a greater depth would put a corner on the far side
+    Check("corner depth", "none: rigid", "m", WALL.thickness, "bound"),
+)
+
+THIN_WALLS = (
+    Case("thin-wall", WALL_CHECKS, measure_shots),
+    Case("thin-wall-10ms", WALL_CHECKS, measure_shots, dt=0.01),
+)
+
+
+RAMP = math.tan(math.radians(30.0))
+"""Slope of the ramp on which the rock rests [-]."""
+
+FACE = 0.5
+"""Chainage of the face of the wall, beyond the foot of the ramp [m]."""
+
+LOADING_TIME, MOVED, BISECTIONS = 2.0, 1e-3, 14
+"""Duration of a push [s], displacement above which a wall counts as moved [m], and number of
+bisections.
+
+A load a thousandth above the limit moves each of the walls by at least 3 mm in that time.
+"""
+
+
+class Push(NamedTuple):
+    """A wall on level ground, its friction angle [deg] and the height of the push on it [m]."""
+
+    wall: GravityWall
+    friction_deg: float
+    height: float
+
+    def limit(self) -> float:
+        """Return the limit load [N]: the lesser of W tan phi (slides) and W b/(2 h) (overturns)."""
+        weight = self.wall.density * GRAVITY * self.wall.thickness * self.wall.height
+        sliding = math.tan(math.radians(self.friction_deg))
+        return weight * min(sliding, 0.5 * self.wall.thickness / self.height)
+
+    def scene(self, force: float) -> Scene:
+        """Return the wall at the foot of a ramp of ice, pushed by a smooth rock with `force` [N].
+
+        The rock touches the face of the wall with its nose. Without friction, it rests on the ramp
+        under the horizontal force W tan(slope), which determines its density.
+        """
+        low, high = 0.6, 6.0
+        corners = np.array(
+            [
+                *[(-high, high * RAMP), (-low, low * RAMP), (FACE, self.height)],
+                *[(-low, low * RAMP + 3.0), (-high, high * RAMP + 3.0)],
+            ]
+        )
+        density = force / (GRAVITY * RAMP * polygon_properties(corners)[0])
+        terrain = Terrain([(-40.0, 40.0 * RAMP), (0.0, 0.0), (60.0, 0.0)], ["ice", "rock"])
+        surfaces = {"rock": Surface(self.friction_deg), "ice": Surface(0.0)}
+        block = Block(corners, density, surface="ice")
+        return Scene(terrain, (block,), surfaces, barriers=(self.wall,))
+
+
+def displacement(lab: Lab, scene: Scene) -> Floats:
+    """Return the displacement and rotation of the first barrier, (3,) [m, m, rad]."""
+    sim = lab.simulate(scene, sleeping=False)
+    start = sim.barrier_poses
+    sim.step(lab.steps(LOADING_TIME))
+    moved: Floats = (sim.barrier_poses - start)[0]
+    return moved
+
+
+def limit_load(lab: Lab, push: Push) -> float:
+    """Return the force above which the wall moves [N], bisected from 0.5 to 1.4 of the limit."""
+    low, high = 0.5 * push.limit(), 1.4 * push.limit()
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if np.hypot(*displacement(lab, push.scene(middle))[:2]) < MOVED:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def limit_loads(lab: Lab, pushes: Sequence[Push]) -> Measured:
+    """Compare limit loads with statics."""
+    return Measured([limit_load(lab, push) for push in pushes], [push.limit() for push in pushes])
+
+
+def turns(lab: Lab, pushes: Sequence[Push]) -> Floats:
+    """Return the rotations of walls at 1.02 of their limit loads [rad], negative downhill."""
+    return np.array([displacement(lab, push.scene(1.02 * push.limit()))[2] for push in pushes])
+
+
+SLIDING_PUSHES = (
+    Push(GravityWall(FACE, 2.0, 1.0), 20.0, 1.0),
+    Push(GravityWall(FACE, 2.0, 2.0), 30.0, 1.2),
+)
+OVERTURNING_PUSHES = (
+    Push(GravityWall(FACE, 2.0, 1.0), 60.0, 1.5),
+    Push(GravityWall(FACE, 2.0, 1.0), 60.0, 1.9),
+)
+
+GRAVITY_WALLS = (
+    Case(
+        "wall-slides",
+        (
+            Check("limit load", "W tan phi", "N", 2e-2, "relative"),
+            Check("turn at 1.02", "none: it slides", "rad", 1e-3, "bound"),
+        ),
+        lambda lab: (
+            limit_loads(lab, SLIDING_PUSHES),
+            Measured(np.abs(turns(lab, SLIDING_PUSHES))),
+        ),
+    ),
+    Case(
+        "wall-overturns",
+        (
+            Check("limit load", "W b/(2 h)", "N", 2e-2, "relative"),
+            Check("overturns at 1.02", "yes: W b/(2 h)", "-", 0.0, "absolute"),
+        ),
+        lambda lab: (
+            limit_loads(lab, OVERTURNING_PUSHES),
+            Measured(turns(lab, OVERTURNING_PUSHES) < -0.05, True),
+        ),
+    ),
+)
+
 
 CAPACITY, ELONGATION = 1e5, 2.0
 """Energy capacity [J/m] and elongation [m] of the fence that volleys hit."""
@@ -33,13 +215,13 @@ STRONG = Fence(0.0, 5.0, 1e6, elongation=8.0)
 RIGID = Fence(0.0, 20.0, 1e9, elongation=1.0)
 """A fence that hardly yields to any block in these cases."""
 
-SIDE = 1.4
+CUBE_SIDE = 1.4
 """Side of the squares of a volley [m]."""
 
-DURATION = 4.0
+BRAKING_TIME = 4.0
 """Time in which three squares arrive and fly on [s]."""
 
-PHASES = (0.0, 0.2, 0.4, 0.6, 0.8)
+FENCE_PHASES = (0.0, 0.2, 0.4, 0.6, 0.8)
 """Fractions of a step by which a volley is delayed, which shifts the impacts within a step."""
 
 
@@ -48,7 +230,7 @@ def plate_mass(fence: Fence) -> float:
     return MASS * fence.height
 
 
-def path(run: Run, barrier: int = 0) -> float:
+def braking_path(run: Run, barrier: int = 0) -> float:
     """Return the downhill displacement of a barrier in a run [m]."""
     return float(run.barrier_poses[-1, barrier, 0] - run.barrier_poses[0, barrier, 0])
 
@@ -71,7 +253,7 @@ def blow(mass: float, speed: float, fence: Fence) -> Stop:
 
 def square_mass() -> float:
     """Return the mass of a square of a volley [kg]."""
-    return float(masses(Scene(None, (box(width=SIDE, height=SIDE),)))[0][0])
+    return float(masses(Scene(None, (box(width=CUBE_SIDE, height=CUBE_SIDE),)))[0][0])
 
 
 def volley(
@@ -95,7 +277,7 @@ def volley(
         speed = math.sqrt(2.0 * share * CAPACITY / square_mass())
         away, y = 3.0 + 5.0 * i + speed * late, 2.0 + 3.0 * i
         x, way = (fence.end + away, -speed) if uphill else (fence.x - away, speed)
-        blocks.append(box(x, y, SIDE, SIDE, velocity=(way, 0.0, 0.0)))
+        blocks.append(box(x, y, CUBE_SIDE, CUBE_SIDE, velocity=(way, 0.0, 0.0)))
     return Scene(Terrain(FLAT), tuple(blocks), rock(30.0, 0.5), barriers=(fence,), gravity=0.0)
 
 
@@ -134,18 +316,18 @@ def outcome(shares: Sequence[float], fence: Fence = FENCE) -> FenceOutcome:
     return FenceOutcome(breaking, kept, spent / fence.braking_force, sum(shares) * CAPACITY - kept)
 
 
-def fly(lab: Lab, scene: Scene) -> tuple[int, float, float]:
+def fly_at_fence(lab: Lab, scene: Scene) -> tuple[int, float, float]:
     """Return the computed number of the breaking hit, the retained energy [J] and the path [m]."""
     sim = lab.simulate(scene)
-    run = sim.run(DURATION)
+    run = sim.run(BRAKING_TIME)
     broken = run.events[run.events["kind"] == FAILED]
     kept = kinetic_energy(sim.velocities, *masses(scene))
-    return int(broken["block"][0]) + 1 if len(broken) else 0, kept, path(run)
+    return int(broken["block"][0]) + 1 if len(broken) else 0, kept, braking_path(run)
 
 
-def measure(lab: Lab, shares: Sequence[float]) -> tuple[Measured, ...]:
+def measure_volley(lab: Lab, shares: Sequence[float]) -> tuple[Measured, ...]:
     """Simulate one volley at all phases."""
-    found = (fly(lab, volley(shares, phase * lab.dt)) for phase in PHASES)
+    found = (fly_at_fence(lab, volley(shares, phase * lab.dt)) for phase in FENCE_PHASES)
     breaking, kept, paths = zip(*found, strict=True)
     exact = outcome(shares)
     return (
@@ -155,14 +337,14 @@ def measure(lab: Lab, shares: Sequence[float]) -> tuple[Measured, ...]:
     )
 
 
-def case(name: str, *shares: float) -> Case:
+def volley_case(name: str, *shares: float) -> Case:
     """Return the case of one volley."""
     checks = (
         Check("hit that breaks it", "the first beyond the capacity", "-", 0.0, "absolute"),
         Check("energy kept", "sum of hits - capacity E - plastic blow", "E", 0.01, "absolute"),
         Check("path", "kinetic energy after the plastic blows / F", "m", 0.03, "absolute"),
     )
-    return Case(name, checks, lambda lab: measure(lab, shares))
+    return Case(name, checks, lambda lab: measure_volley(lab, shares))
 
 
 def together(fence: Fence, blocks: Sequence[Block], momentum: float) -> float:
@@ -187,7 +369,7 @@ def push_together(
     scene = Scene(Terrain(FLAT), tuple(blocks), rock(0.0), barriers=(STRONG,))
     momentum = float(masses(scene)[0][0]) * sum(speeds)
     exact = together(STRONG, blocks, momentum)
-    return (Measured(path(lab.simulate(scene).run(3.0)), exact),)
+    return (Measured(braking_path(lab.simulate(scene).run(3.0)), exact),)
 
 
 def in_one_step(lab: Lab, ahead: float, fast: float = 20.0) -> tuple[Measured]:
@@ -263,7 +445,7 @@ class Lean(NamedTuple):
 
 def lean(lab: Lab, leans: Sequence[Lean], time: float = 1.0) -> tuple[Measured]:
     """Compare the displacements of fences under rows on slopes in a time [s]."""
-    found = [path(lab.simulate(one.scene).run(time)) for one in leans]
+    found = [braking_path(lab.simulate(one.scene).run(time)) for one in leans]
     return (Measured(found, [one.path(time) for one in leans]),)
 
 
@@ -324,7 +506,7 @@ def _measured(pairs: Sequence[tuple[float, float]]) -> Measured:
     return Measured(computed, exact)
 
 
-CASES = (
+FENCES = (
     joint_push("fence-train", 0, -3.0, -4.0, -5.0),
     joint_push("fence-row", 3, -6.0),
     Case(
@@ -332,9 +514,9 @@ CASES = (
         (Check("path", "momentum of blow and hit, then energy / F", "m", 0.01, "relative"),),
         lambda lab: in_one_step(lab, 0.5),
     ),
-    case("fence-0.9", 0.9),
-    case("fence-1.1", 1.1),
-    case("fence-3x0.45", 0.45, 0.45, 0.45),
+    volley_case("fence-0.9", 0.9),
+    volley_case("fence-1.1", 1.1),
+    volley_case("fence-3x0.45", 0.45, 0.45, 0.45),
     Case(
         "fence-eccentric",
         (

@@ -11,7 +11,7 @@ from matplotlib.image import imsave
 import rigdda.envs
 from rigdda import Barrier, Ditch, Fence, Site
 from rigdda.app.reports import pictures
-from rigdda.app.reports.simulation_folder import along
+from rigdda.app.reports.simulation_report import along
 from rigdda.app.reports.stations import Passing, summary
 from rigdda.envs.corridor_environment import CorridorDesign
 from rigdda.files import atomic
@@ -58,7 +58,7 @@ def tutorial(path: Path) -> None:
     lines = along(site)
     found = passages(site, (), [(seed, None) for seed in range(200)], lines.tolist())
     passing = Passing.of(site, (), None, found)
-    pictures.released(path, passing, (), summary(passing, range(len(lines))))
+    pictures.released_slope(path, passing, (), summary(passing, range(len(lines))))
 
 
 def trajectories(path: Path) -> None:

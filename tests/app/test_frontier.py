@@ -22,7 +22,7 @@ from rigdda.agents.designers.rule import RuleAnswer
 from rigdda.app import design, verified_frontier
 from rigdda.app.barrier_checks import LayoutChecks
 from rigdda.app.design_study import DesignStudy, VerifiedLayout
-from rigdda.app.reports import findings, frontier_report
+from rigdda.app.reports import design_report, findings
 from rigdda.app.reports.wording import at_most, euros, percent, span
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation
@@ -328,12 +328,12 @@ def test_a_missed_target_returns_a_verified_frontier(
     assert ("all of them are verified" in lines[0]) == (count == len(done.frontier))
     least = min(done.frontier, key=lambda one: one.level)
     assert f"is {at_most(least.level)}, for {euros(least.cost)} EUR" in lines[1]
-    frontier_report.write(tmp_path, problem, done.frontier)
+    design_report.write_frontier(tmp_path, problem, done.frontier)
     written = rows(tmp_path / "frontier.csv")
     assert [float(row["cost"]) for row in written] == [one.cost for one in done.frontier]
     assert [float(row["reach_bound"]) for row in written] == [o.level for o in done.frontier]
     assert (tmp_path / "frontier.png").read_bytes().startswith(b"\x89PNG")
     again, resumed = design.design(problem, "race", 3_000, seed, 500, tmp_path, lambda *_: None)
     assert resumed.simulated == 0 and again.frontier == done.frontier
-    frontier_report.write(tmp_path, problem, ())
+    design_report.write_frontier(tmp_path, problem, ())
     assert not (tmp_path / "frontier.csv").exists()

@@ -11,7 +11,7 @@ from processes import png_size, refused, rig, rows, run
 
 import rigdda
 from rigdda import Site, load_layout
-from rigdda.app.reports import band_report
+from rigdda.app.reports import design_report
 from rigdda.app.reports.wording import span
 from rigdda.app.uncertainty.ground_band import BandLayout, GroundSample, inputs
 from rigdda.app.uncertainty.parameters import Posterior, set_numbers
@@ -133,12 +133,12 @@ def test_the_verdict_names_the_rival() -> None:
     from rigdda.app.uncertainty.ground_band import Band
 
     band = Band((sample(10, 12, 0), sample(15, 11, 10), sample(12, 11, 10)), 100, "", ())
-    words = band_report.verdict(band)
+    words = design_report.band_verdict(band)
     assert "on 1 of 3 grounds, the chosen layout is the cheapest" in words
     assert "on 1, another one is cheaper by no more than the noise" in words
     assert "on 1, 'rival' is cheaper by up to 4 EUR" in words
     assert "depends on the ground" in words
-    assert "survives" in band_report.verdict(Band((sample(10, 12, 0),), 100, "", ()))
+    assert "survives" in design_report.band_verdict(Band((sample(10, 12, 0),), 100, "", ()))
 
 
 def test_the_number_of_grounds_is_checked(tmp_path: Path) -> None:

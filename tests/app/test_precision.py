@@ -19,7 +19,7 @@ from rigdda.agents.designers.surrogate import expected_gain
 from rigdda.app import design
 from rigdda.app.design_study import VerifiedLayout
 from rigdda.app.interim_answer import BEST, InterimAnswer
-from rigdda.app.reports import interim_answer
+from rigdda.app.reports import design_report
 from rigdda.app.verification import Verification, clear, stages
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.comparison import Difference
@@ -161,11 +161,11 @@ def test_the_first_answer_comes_before_the_search_and_improves(verification: Ver
     best = told[-1][-1]
     assert best.name == BEST and best.evaluation.layout == GOOD
     assert best.evaluation == verification.evaluate(GOOD)  # on releases that no search sees
-    words = interim_answer.line(told[-1])
+    words = design_report.interim_line(told[-1])
     assert "with 375 releases of each layout" in words and "best so far: fence 500 kJ" in words
     for case in told[-1]:
         assert case.name in words
-    assert interim_answer.table(told[-1]).row_count == 3
+    assert design_report.interim_table(told[-1]).row_count == 3
 
 
 def test_a_study_uses_all_releases_or_stops(site: Site, few_blocks: None, tmp_path: Path) -> None:

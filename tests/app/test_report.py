@@ -31,9 +31,9 @@ import rigdda
 from rigdda import MECHANICS, BadInput, Site
 from rigdda.agents.run_record import RunRecord, read
 from rigdda.app import browser, cli, report_server
-from rigdda.app.reports import assumptions, report_sections
-from rigdda.app.reports.exhibits import EXHIBITS
+from rigdda.app.reports import html_report
 from rigdda.app.reports.html_blocks import inline
+from rigdda.app.reports.html_report import EXHIBITS
 
 DESIGN = [
     "design", "chute.toml", "--budget", "60", "--verify", "40", "--target", "0.05",
@@ -260,15 +260,15 @@ def test_unknown_tables_are_in_the_appendix(made: Made, tmp_path: Path) -> None:
 
 
 def test_each_exhibit_belongs_to_a_section() -> None:
-    names = {section.name for section in report_sections.SECTIONS}
+    names = {section.name for section in html_report.SECTIONS}
     assert {exhibit.section for exhibit in EXHIBITS} <= names
 
 
 def test_differences_of_sites_name_each_value() -> None:
     site = Site.load("quick")
     prices = msgspec.structs.replace(site.prices, interest=0.05)
-    assert assumptions.differences(site, site) == []
-    assert assumptions.differences(site, msgspec.structs.replace(site, prices=prices)) == [
+    assert html_report.site_differences(site, site) == []
+    assert html_report.site_differences(site, msgspec.structs.replace(site, prices=prices)) == [
         "prices.interest = 0.05 instead of 0.03"
     ]
 

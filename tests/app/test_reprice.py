@@ -18,7 +18,7 @@ from rigdda import BadInput, Outcome, Site
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.app import archive, design, reprice
-from rigdda.app.reports import frontier_report
+from rigdda.app.reports import design_report
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation, ensemble
 from rigdda.envs.cost import judge
@@ -226,7 +226,7 @@ def test_the_command_answers_in_a_folder_of_its_own(designed: Path, tmp_path: Pa
     assert rigdda.load_layout(tmp_path / "o/layout.toml") == done.chosen.evaluation.layout
     assert rows(tmp_path / "o/frontier.csv") == [
         {k: "" if reprice_empty(v) else str(v) for k, v in row.items()}
-        for row in frontier_report.rows(done.frontier)
+        for row in design_report.frontier_rows(done.frontier)
     ]
     assert "consequences.closure = 20000 (was 50,000)" in words
     assert "nothing was simulated" in words and "best of search" in words

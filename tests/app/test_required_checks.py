@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from rigdda import BadInput, Ditch, Fence, Site
 from rigdda.agents.designers.menu import Menu
 from rigdda.app.barrier_checks import check_layout
-from rigdda.app.reports.headline import DesignAnswer, FailedCheck, headline
+from rigdda.app.reports.findings import DesignAnswer, FailedCheck, headline
 from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.barrier_formulas import checks_of
 from rigdda.envs.environments import BarrierDesign

@@ -16,7 +16,7 @@ from scipy.stats import binom
 
 from rigdda import Fence, Site
 from rigdda.app.reports import stations
-from rigdda.app.reports.simulation_folder import TABLES
+from rigdda.app.reports.simulation_report import TABLES
 from rigdda.app.reports.stations import LEVELS, QUANTITIES, Passing
 from rigdda.envs.intervals import mid_p
 from rigdda.envs.quantiles import quantiles

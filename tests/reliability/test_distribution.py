@@ -21,7 +21,7 @@ import rigdda
 from rigdda import BadInput, Ditch, Site, distribution
 from rigdda.agents.corridor.planning import Planner
 from rigdda.app import cli
-from rigdda.app.reports import corridor_folder
+from rigdda.app.reports import corridor_report
 from rigdda.envs import CorridorProblem
 from rigdda.passages import passages
 
@@ -225,8 +225,8 @@ def test_a_corridor_goes_on_without_a_worker_that_dies(tmp_path: Path) -> None:
             there = Planner(problem, 300, tick=kill_one).plan()
     here = Planner(problem, 300).plan()
     assert killed and killed[0] < here.releases
-    corridor_folder.write(here, tmp_path / "here")
-    corridor_folder.write(there, tmp_path / "there")
+    corridor_report.write(here, tmp_path / "here")
+    corridor_report.write(there, tmp_path / "there")
     for name in ("budgets.csv", "sections.csv", "fronts.csv", "priorities.csv"):
         assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
 

@@ -63,7 +63,7 @@ def corridor(
     import rigdda
     from rigdda.agents.corridor.planning import Planner
     from rigdda.app.released import released
-    from rigdda.app.reports import corridor_folder as report
+    from rigdda.app.reports import corridor_report as report
     from rigdda.envs import CorridorProblem
 
     where = rigdda.Corridor.load(file)

@@ -140,29 +140,32 @@ def design(
     """
     from rigdda.agents.designers.store import FILE, record_problem
     from rigdda.app import design as job
-    from rigdda.app.reports import band_report, interim_answer
-    from rigdda.app.reports.folder import FILES, write
+    from rigdda.app.reports import design_report as report
     from rigdda.app.uncertainty import ground_band
     from rigdda.app.uncertainty.parameters import read_posterior
 
     problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone, checks)
     fitted = None if posterior is None else read_posterior(posterior, problem.site)
-    folder = folder_for(out, f"design-{problem.site.name}", *FILES, *band_report.FILES, FILE)
-    record_problem(folder, problem, *FILES)
+    folder = folder_for(
+        out, f"design-{problem.site.name}", *report.DESIGN_FILES, *report.BAND_FILES, FILE
+    )
+    record_problem(folder, problem, *report.DESIGN_FILES)
     band = None
     with recorded_run(folder, problem.site):
         total = job.search_budget(problem, designer, budget) + CASES * verify
         with interim(total) as (tick, show_interim):
             done, store = job.design(
                 problem, designer, budget, seed, verify, folder, tick, precision,
-                lambda cases: show_interim(interim_answer.line(cases), interim_answer.table(cases)),
+                lambda cases: show_interim(
+                    report.interim_line(cases), report.interim_table(cases)
+                ),
             )  # fmt: skip
             tick(total, "pictures")
-            write(done, folder, seed)
+            report.write_design(done, folder, seed)
         if grounds:
             with progress(grounds) as tick:
                 band = ground_band.assess(done, grounds, fitted, seed, folder, tick)
-            band_report.write(folder, band)
+            report.write_band(folder, band)
             ground_band.forget(folder)
     _tell(done, store, folder)
     if band is not None:
@@ -170,10 +173,10 @@ def design(
             f"on {len(band.samples)} other grounds ({band.source}), {band.releases} releases of "
             "each layout on each;\nP(reach): of the design event that reaches the road most often"
         )
-        show(band_report.table(band))
-        for line in filter(None, (band_report.verdict(band), band_report.on_target(band))):
+        show(report.band_table(band))
+        for line in filter(None, (report.band_verdict(band), report.band_on_target(band))):
             finding(line)
-        click.echo(f"{', '.join(band_report.FILES)} are in {folder}")
+        click.echo(f"{', '.join(report.BAND_FILES)} are in {folder}")
     warn_of_placeholders(site)
 
 
@@ -203,12 +206,12 @@ def _pose(
 
 def _tell(done: DesignStudy, store: Store, folder: Path) -> None:
     """Print the tables, the layout to order, its limits and the computing effort."""
-    from rigdda.app.reports import checks, findings, frontier_report, headline, tables
-    from rigdda.app.reports.folder import FILES
+    from rigdda.app.reports import design_report as report
+    from rigdda.app.reports import findings, tables
     from rigdda.app.reports.wording import order, unchanged
 
     chosen, result = done.chosen.evaluation, done.result
-    click.echo(f"{headline.headline(findings.answer(done))}\n")
+    click.echo(f"{findings.headline(findings.answer(done))}\n")
     click.echo(
         "Z, capital, harm and repair in EUR per metre of road and year; to build in EUR per\n"
         "metre; debris: rock on the road, relative to the first layout"
@@ -224,7 +227,7 @@ def _tell(done: DesignStudy, store: Store, folder: Path) -> None:
     for line in findings.frontier(done, done.frontier, len(result.tried), done.replaced):
         finding(line)
     if done.frontier:
-        show(frontier_report.table(done.problem.site, done.frontier))
+        show(report.frontier_table(done.problem.site, done.frontier))
     from_start = " (a starting layout of the search)" if result.origin == "start" else ""
     site = done.problem.site
     click.echo(f"layout{from_start}:" if chosen.layout else f"layout: {unchanged(site)}")
@@ -232,16 +235,16 @@ def _tell(done: DesignStudy, store: Store, folder: Path) -> None:
         click.echo(f"  {order(barrier, site)}")
     for line in findings.existing_barriers(site, chosen.layout):
         click.echo(f"  {line}")
-    finding(checks.rule_words(done.rule))
+    finding(report.rule_words(done.rule))
     if done.checks.table:
         click.echo("checks of this layout (checks.csv, design_sheet.csv)")
-        show(checks.table(done.checks))
-    for line in checks.notes(done.checks):
+        show(report.check_table(done.checks))
+    for line in report.check_notes(done.checks):
         finding(line)
     for line in findings.of_design(done):
         finding(line)
     resumed = f"; {store.resumed:,} releases from an earlier run" if store.resumed else ""
-    files = [*FILES, *(frontier_report.FILES if done.frontier else ())]
+    files = [*report.DESIGN_FILES, *(report.FRONTIER_FILES if done.frontier else ())]
     files += [tables.RISKS] if site.traffic is not None else []
     click.echo(
         f"search: {result.simulations:,} releases, {result.seconds:.0f} s of processor time; "

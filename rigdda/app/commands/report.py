@@ -33,14 +33,14 @@ def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) 
     method, and the commands, seeds and versions to repeat the results.
     """
     from rigdda.app import browser
-    from rigdda.app.reports import report_page, results_folder
+    from rigdda.app.reports import html_blocks, html_report
 
-    folders = results_folder.open_all(results)
+    folders = html_blocks.open_all(results)
     program = browser.find() if pdf else None
-    replay = results_folder.replay_of(folders) if serve else None
-    page = report_page.compose(folders)
-    files = (report_page.FILE, "report.pdf") if pdf else (report_page.FILE,)
-    file = report_page.write(page, folder_for(out or results[0], "", *files))
+    replay = html_blocks.replay_of(folders) if serve else None
+    page = html_report.compose(folders)
+    files = (html_report.REPORT_FILE, "report.pdf") if pdf else (html_report.REPORT_FILE,)
+    file = html_report.write_report(page, folder_for(out or results[0], "", *files))
     click.echo(file)
     if program is not None:
         click.echo(browser.print_pdf(program, file))

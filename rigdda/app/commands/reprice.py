@@ -58,12 +58,12 @@ def reprice(
     cost.png and, if a target is missed, frontier.csv and frontier.png; with traffic risk.csv.
     """
     from rigdda.app import reprice as job
-    from rigdda.app.reports import findings, frontier_report, reprice_report, tables
+    from rigdda.app.reports import design_report, findings, reprice_report, tables
     from rigdda.app.reports.wording import order, unchanged
 
     asked = job.other_targets(target, failure, target_risk)
     done = job.reprice(results, job.parse_all(settings), asked, max_cost)
-    files = (*reprice_report.FILES, *frontier_report.FILES)
+    files = (*reprice_report.FILES, *design_report.FRONTIER_FILES)
     folder = folder_for(out, f"reprice-{results.resolve().name}", *files)
     if folder.resolve() == results.resolve():
         raise click.UsageError("--out is the folder of the design: name another folder")
@@ -79,7 +79,7 @@ def reprice(
     for line in findings.frontier(done, done.frontier, done.tried, False):
         finding(line)
     if done.frontier:
-        show(frontier_report.table(done.problem.site, done.frontier))
+        show(design_report.frontier_table(done.problem.site, done.frontier))
     chosen, site = done.chosen.evaluation.layout, done.problem.site
     click.echo("layout:" if chosen else f"layout: {unchanged(site)}")
     for barrier in chosen:

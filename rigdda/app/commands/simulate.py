@@ -72,7 +72,7 @@ def simulate(
     import rigdda
     from rigdda.app import simulate as job
     from rigdda.app.released import released
-    from rigdda.app.reports import findings, simulation_folder, stations, tables
+    from rigdda.app.reports import findings, simulation_report, stations, tables
     from rigdda.app.reports.stations import Passing
     from rigdda.passages import check_stations
 
@@ -92,15 +92,15 @@ def simulate(
         return
     where.realise(barriers, seed, event)  # report an impossible layout before making a folder
     asked = check_stations(where, at or (where.road.start,))
-    folder = folder_for(out, f"simulate-{where.name}", *simulation_folder.files(asked.tolist()))
+    folder = folder_for(out, f"simulate-{where.name}", *simulation_report.files(asked.tolist()))
     with recorded_run(folder, where), progress(releases) as tick:
-        lines = simulation_folder.lines(where, asked)
+        lines = simulation_report.lines(where, asked)
         found = job.simulate(where, barriers, seeds, event, lines.tolist(), folder, tick)
         tick(releases, "tables and pictures")
         tables.write_outcomes(folder / "outcomes.csv", seeds, found.outcomes)
         found.run.save(folder / "run.npz")
         passing = Passing.of(where, barriers, event, found.passages)
-        rows, rest = simulation_folder.write(folder, passing, barriers, asked)
+        rows, rest = simulation_report.write(folder, passing, barriers, asked)
         job.forget(folder)
     show(tables.outcomes(where, barriers, found.outcomes, stations.stopped(rest)))
     for line, table in stations.tables(rows):

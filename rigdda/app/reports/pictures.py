@@ -1,27 +1,43 @@
-"""Pictures of a slope in section and of cost against risk.
+"""Pictures of a slope: in section, of what passes, and of what the engineering rule demands.
 
 The section shows the trajectories of blocks, the barriers, and envelopes of the heights and the
-energies of the blocks.
+energies of the blocks. Further pictures show what passes along the slope and at a station, where
+blocks stop, and cost against risk.
+
+The picture of the rule answers where a fence of a given class would do: the demanded energy between
+the classes of the catalogue, the needed height between their greatest heights, and for each class
+the stretches where it satisfies the rule.
 """
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigdda import Barrier, Fence, Layout, Mesh, Run, Simulation, Site
-from rigdda.app.reports.stations import Passing, Rows, summary
-from rigdda.barriers import Earthwork, earthworks
-from rigdda.barriers.fence import WornFence
+from rigdda.app.reports.stations import (
+    ALL,
+    PER,
+    QUANTITIES,
+    RATE,
+    Passing,
+    Rows,
+    summary,
+    undecided,
+)
+from rigdda.barriers import FENCE_CLASSES, Earthwork, earthworks, standing
+from rigdda.barriers.fence import CLASSES, WornFence
 from rigdda.display import BARRIER, OLD, ROAD, ZONE
-from rigdda.envs import Evaluation
+from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.envelope import largest
 from rigdda.envs.rendering import (
     BAND,
@@ -46,16 +62,17 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure, FigureBase
 
+
 Floats = NDArray[np.float64]
 
-DRAWN = 30
+DRAWN_TRAJECTORIES = 30
 """Largest number of trajectories of an event that are drawn."""
 
-ENOUGH = 300
+ENVELOPE_BLOCKS = 300
 """Largest number of blocks of an event behind an envelope of a design; 15 are above the 95 %
 quantile."""
 
-EVERY = 0.05
+FRAME_INTERVAL = 0.05
 """Time between two points of a trajectory [s]."""
 
 
@@ -121,17 +138,17 @@ def trajectories(site: Site, layout: Layout, event: str, seeds: Sequence[int]) -
         If a simulation diverges.
     """
     first = _run(site, layout, event, seeds[0])
-    more = seeds[1 : max(1, -(-DRAWN // len(first.scene.blocks)))]
+    more = seeds[1 : max(1, -(-DRAWN_TRAJECTORIES // len(first.scene.blocks)))]
     with ThreadPoolExecutor() as pool:
         runs = [first, *pool.map(lambda seed: _run(site, layout, event, seed), more)]
     ways = [run.poses[:, i, :2] for run in runs for i in range(run.poses.shape[1])]
-    return EventTrajectories(event, tuple(ways[:: max(1, len(ways) // DRAWN)]))
+    return EventTrajectories(event, tuple(ways[:: max(1, len(ways) // DRAWN_TRAJECTORIES)]))
 
 
 def _run(site: Site, layout: Layout, event: str, seed: int) -> Run:
     scene = site.realise(layout, seed, event)
     simulation = Simulation(scene, site.settings(scene), leave=ends(site)[1])
-    return simulation.run(site.motion.duration, EVERY)
+    return simulation.run(site.motion.duration, FRAME_INTERVAL)
 
 
 def envelopes(
@@ -174,7 +191,17 @@ def reach(corners: Floats) -> tuple[float, float]:
     return float(corners[:, 0].min()), float(corners[:, 0].max())
 
 
-__all__ = ["BARRIER", "DPI", "FONT", "ROAD", "ZONE", "Point", "colours", "cost", "save"]
+__all__ = [
+    "BARRIER",
+    "DPI",
+    "FONT",
+    "ROAD",
+    "ZONE",
+    "Point",
+    "colours",
+    "cost_against_risk",
+    "save",
+]
 
 TRIED, EQUAL = "#9aa5b1", "#c8ccd0"
 EVENTS = ("#0072b2", "#d0312d", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#7b4fb0", "#6b4226")
@@ -233,7 +260,7 @@ def colour_of(site: Site, event: str) -> str:
     return colours(len(site.events))[site.event_names.index(event)]
 
 
-def cost(
+def cost_against_risk(
     path: str | os.PathLike[str], tried: Sequence[Evaluation], points: Sequence[Point]
 ) -> None:
     """Write a PNG diagram of the annual capital cost of layouts against their remaining risk.
@@ -395,7 +422,7 @@ def section(
         save(figure, path)
 
 
-COLUMNS = 3
+SLOPES_PER_ROW = 3
 """Largest number of slopes side by side."""
 
 
@@ -413,14 +440,14 @@ def slopes(
     zone : BarrierZone
         The zone in which barriers may be built.
     panels : sequence of Panel
-        The slopes, up to `COLUMNS` side by side.
+        The slopes, up to `SLOPES_PER_ROW` side by side.
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     window = _window(site, panels)
     left, right, bottom, top = window
-    columns = 2 if len(panels) == 4 else min(COLUMNS, len(panels))
+    columns = 2 if len(panels) == 4 else min(SLOPES_PER_ROW, len(panels))
     rows = -(-len(panels) // columns)
     tall = min(13.0 / columns * (top - bottom) / (right - left), 7.0) + 0.6
     with rc_context(FONT):
@@ -438,7 +465,9 @@ def slopes(
         save(figure, path)
 
 
-def released(path: str | os.PathLike[str], passing: Passing, layout: Layout, rows: Rows) -> None:
+def released_slope(
+    path: str | os.PathLike[str], passing: Passing, layout: Layout, rows: Rows
+) -> None:
     """Write a PNG picture of releases with a layout.
 
     Parameters
@@ -584,7 +613,7 @@ def plain_log(axes: Axes) -> None:
     """Make the y axis logarithmic, with plain numbers and at most four powers of ten."""
     axes.set_yscale("log")
     low, high = axes.get_ylim()
-    axes.set_ylim(bottom=max(low, high / RATIO))
+    axes.set_ylim(bottom=max(low, high / AXIS_RATIO))
     plain_numbers(axes.yaxis, (1.0, 2.0, 5.0))
 
 
@@ -597,7 +626,7 @@ def plain_numbers(axis: Axis, multiples: Sequence[float]) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,g}"))
 
 
-RATIO = 1e4
+AXIS_RATIO = 1e4
 """Greatest ratio of the ends of a logarithmic axis."""
 
 
@@ -629,3 +658,390 @@ def _key(figure: FigureBase, site: Site, events: Sequence[str], envelopes: bool 
         ]
     figure.legend(handles=lines, loc="outside lower center", ncols=min(4, len(lines)),
                   frameon=False)  # fmt: skip
+
+
+Style = Literal[":", "-", "--"]
+
+QUANTILE_LINES: dict[str, Style] = {"q50": ":", "q95": "-", "q99": "--"}
+"""Styles of the quantiles of a picture along the slope."""
+
+BINS = 30
+"""Bins of a histogram."""
+
+HISTOGRAM_RATIO = 1e4
+"""Greatest energy over the least that is told apart in a histogram."""
+
+WHOLE, NORMAL = "#222222", "#b5651d"
+"""Colours of all events together, and of heights normal to the slope."""
+
+ALONG_SLOPE = ("energy", "velocity", "height", RATE)
+"""Quantities of the picture along the slope."""
+
+AT_STATION = ("energy", "velocity", "height")
+"""Quantities of the histograms at a station."""
+
+
+def along_slope(path: str | os.PathLike[str], passing: Passing, rows: Rows) -> None:
+    """Write the PNG of quantiles along the slope.
+
+    Parameters
+    ----------
+    path : path
+        The PNG.
+    passing : Passing
+        The releases.
+    rows : list of dict
+        Table along the slope, see `rigdda.app.reports.stations.summary`.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    with rc_context(FONT):
+        figure = Figure((11.0, 8.0), dpi=DPI, layout="constrained")
+        for axes, quantity in zip(
+            figure.subplots(2, 2, sharex=True).flat, ALONG_SLOPE, strict=True
+        ):
+            own = [row for row in rows if row["quantity"] == quantity]
+            if quantity == RATE:
+                _rates(axes, passing, own)
+            else:
+                other = "height_normal" if quantity == "height" else ""
+                _quantiles(axes, passing, own, [r for r in rows if r["quantity"] == other])
+            axes.axvspan(
+                passing.site.road.start, passing.site.road.end, color=ROAD, alpha=0.2, lw=0
+            )
+            axes.grid(alpha=0.25)
+            axes.set_xlabel("x [m]")
+        _legend(figure, passing)
+        save(figure, path)
+
+
+def _quantiles(axes: Axes, passing: Passing, rows: Rows, normal: Rows) -> None:
+    """Draw the quantiles over all events, with the interval of the 95 % quantile.
+
+    `normal` are the rows of heights normal to the slope, of which the 95 % quantile is drawn; it is
+    empty for other quantities.
+    """
+    own = [row for row in rows if row["event"] == passing.groups[-1]]
+    x = [row["x_m"] for row in own]
+    for name, style in QUANTILE_LINES.items():
+        value, high = (np.array([row[key] for row in own]) for key in (name, f"{name}_high"))
+        draw_quantile(axes, x, value, high, color=WHOLE, linestyle=style)
+    band = [[row[f"q95_{end}"] for row in own] for end in ("low", "high")]
+    axes.fill_between(x, band[0], band[1], color=WHOLE, alpha=0.18, lw=0)
+    if normal:
+        lies = [row for row in normal if row["event"] == passing.groups[-1]]
+        axes.plot(x, [row["q95"] for row in lies], color=NORMAL, linewidth=1.2)
+    name = own[0]["quantity"]
+    axes.set_title(f"{QUANTITIES[name].words}, {passing.groups[-1]} [{own[0]['unit']}]", loc="left",
+                   fontsize=10)  # fmt: skip
+    if name == "energy" and any(row["q50"] > 0.0 for row in own):
+        plain_log(axes)
+    else:
+        axes.set_ylim(bottom=0.0)
+
+
+def _rates(axes: Axes, passing: Passing, rows: Rows) -> None:
+    """Draw how often a release passes, by event."""
+    for group in passing.groups:
+        own = [row for row in rows if row["event"] == group]
+        x, colour = [row["x_m"] for row in own], _colour_of_group(passing, group)
+        axes.plot(x, [row["mean"] for row in own], color=colour, linewidth=1.6)
+        low, high = ([row[f"mean_{end}"] for row in own] for end in ("low", "high"))
+        axes.fill_between(x, low, high, color=colour, alpha=0.18, lw=0)
+    axes.set_ylim(bottom=0.0)
+    axes.set_title(f"releases that pass [{PER} of road]", loc="left", fontsize=10)
+
+
+def _colour_of_group(passing: Passing, group: str) -> str:
+    """Return the colour of an event, or of all events."""
+    return WHOLE if group == ALL else colour_of(passing.site, group)
+
+
+def _legend(figure: Figure, passing: Passing) -> None:
+    """Say what lines and colours mean, below the picture."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    lines: list[Any] = [
+        Line2D([], [], color=WHOLE, linestyle=style, label=f"{name[1:]} % of blocks are below")
+        for name, style in QUANTILE_LINES.items()
+    ]
+    lines += [
+        Line2D([], [], color=_colour_of_group(passing, group), linewidth=2, label=f"{group} (rate)")
+        for group in passing.groups
+    ]
+    lines += [
+        Patch(color=WHOLE, alpha=0.18, lw=0, label="95 % interval"),
+        Line2D([], [], color=NORMAL, linewidth=1.2, label="95 %, normal to the slope"),
+        Line2D([], [], color=WHOLE, linewidth=0.7, alpha=0.6, label="too few blocks for one"),
+        Patch(color=ROAD, alpha=0.2, lw=0, label="road"),
+    ]
+    figure.legend(handles=lines, loc="outside lower center", ncols=4, frameon=False, fontsize=10)
+
+
+def station(path: str | os.PathLike[str], passing: Passing, place: int, rows: Rows) -> None:
+    """Write the PNG of the histograms at a station.
+
+    Parameters
+    ----------
+    path : path
+        The PNG.
+    passing : Passing
+        The releases.
+    place : int
+        Index of the station.
+    rows : list of dict
+        Table of stations, see `rigdda.app.reports.stations.summary`.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    x = float(passing.found.stations[place])
+    with rc_context(FONT):
+        figure = Figure((11.0, 4.6), dpi=DPI, layout="constrained")
+        for axes, quantity in zip(figure.subplots(1, 3), AT_STATION, strict=True):
+            _histogram(axes, passing, place, quantity)
+            own = [row for row in rows if row["x_m"] == x and row["quantity"] == quantity]
+            _mark_quantiles(axes, own[-1])
+        handles, labels = axes.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False,
+                      fontsize=10)  # fmt: skip
+        count = len(passing.found.at(place))
+        figure.suptitle(f"{passing.site.name}, x = {x:g} m: {count:,} blocks pass in "
+                        f"{len(passing.found.seed):,} releases", fontsize=11)  # fmt: skip
+        save(figure, path)
+
+
+def _histogram(axes: Axes, passing: Passing, place: int, quantity: str) -> None:
+    """Draw the share of passing blocks by a quantity, each event in its colour."""
+    known = QUANTITIES[quantity]
+    parts = [(event, passing.passages(event, place)) for event in passing.events]
+    group = passing.groups[-1]
+    rows = passing.passages(group, place)
+    axes.set(xlabel=f"{known.words} [{known.unit}]", ylabel="share of passing blocks [%]")
+    axes.grid(alpha=0.25)
+    if not len(rows):
+        axes.text(0.5, 0.5, "no block passes", ha="center", transform=axes.transAxes)
+        return
+    values = known.of(rows)
+    low, high = min(0.0, float(values.min())), max(float(values.max()), 1e-9)
+    edges = np.linspace(low, high, BINS + 1).tolist()
+    if quantity == "energy":
+        edges = np.geomspace(high / HISTOGRAM_RATIO, high, BINS + 1).tolist()
+        axes.set_xscale("log")
+        plain_numbers(axes.xaxis, (1.0,))
+    weight = passing.sample(group, rows, values).weight
+    whole = float(weight.sum())
+    drawn = [(event, known.of(own), weight[rows["event"] == own["event"][0]])
+             for event, own in parts if len(own)]  # fmt: skip
+    drawn = [one for one in drawn if len(one[2])]
+    axes.hist([np.clip(v, edges[0], edges[-1]) for _, v, _ in drawn], edges,
+              weights=[100.0 * w / whole for *_, w in drawn],
+              stacked=True, color=[_colour_of_group(passing, event) for event, *_ in drawn],
+              label=[event for event, *_ in drawn])  # fmt: skip
+
+
+def _mark_quantiles(axes: Axes, row: dict[str, Any]) -> None:
+    """Draw the quantiles over all events as lines."""
+    for name, style in QUANTILE_LINES.items():
+        if np.isfinite(row[name]):
+            axes.axvline(row[name], color=WHOLE, linestyle=style, linewidth=1.4,
+                         label=f"{name[1:]} % are below")  # fmt: skip
+
+
+def run_out(path: str | os.PathLike[str], passing: Passing, rows: Rows) -> None:
+    """Write the PNG of how often rock stops beyond each chainage.
+
+    Parameters
+    ----------
+    path : path
+        The PNG.
+    passing : Passing
+        The releases.
+    rows : list of dict
+        Table of the run-out, see `rigdda.app.reports.stations.run_out`.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    with rc_context(FONT):
+        figure = Figure((10.0, 6.0), dpi=DPI, layout="constrained")
+        axes = figure.subplots()
+        for group in passing.groups:
+            own = [row for row in rows if row["event"] == group and row["rate"] > 0.0]
+            x, colour = [row["x_m"] for row in own], _colour_of_group(passing, group)
+            axes.plot(x, [row["rate"] for row in own], color=colour, linewidth=1.8, label=group)
+            low, high = ([row[f"rate_{end}"] for row in own] for end in ("low", "high"))
+            axes.fill_between(x, low, high, color=colour, alpha=0.18, lw=0)
+        if any(row["rate"] > 0.0 for row in rows):
+            plain_log(axes)
+        road = passing.site.road
+        axes.axvspan(road.start, road.end, color=ROAD, alpha=0.2, lw=0, label="road")
+        axes.grid(alpha=0.25)
+        axes.set(xlabel="x [m]", ylabel=f"releases with a block that stops beyond x [{PER}]")
+        words = undecided(passing) or "every block had stopped when its release ended"
+        axes.set_title(words, loc="left", fontsize=10)
+        figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=10)
+        save(figure, path)
+
+
+DEMAND, FITS, ENERGY_ONLY = "#1a1a1a", "#2a9d8f", "#c9ddd9"
+"""Colours of the demand, of stretches where a class satisfies the rule, and of stretches where only
+its energy suffices."""
+
+NOTE = "#4a5560"
+"""Colour of the names of classes."""
+
+TALL = 12.0
+"""Largest height in the picture [m] unless more is needed everywhere; no fence is nearly as
+high."""
+
+FENCE_MARKERS = "Do^sv"
+"""Markers of the fences of different layouts."""
+
+
+def draw_demand(
+    path: str | os.PathLike[str],
+    problem: DesignProblem,
+    rows: Sequence[Mapping[str, Any]],
+    layouts: Mapping[str, Layout],
+) -> None:
+    """Write the PNG of the demand along the slope.
+
+    Parameters
+    ----------
+    path : path
+        The PNG.
+    problem : DesignProblem
+        The problem.
+    rows : sequence of dict
+        Table of the demand, see `rigdda.app.reports.design_report.demand_rows`.
+    layouts : mapping of str to Layout
+        Layouts whose fences are shown, by name.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    with rc_context(FONT):
+        figure = Figure((11.0, 10.5), dpi=DPI, layout="constrained")
+        panels = figure.subplots(3, 1, sharex=True, height_ratios=[1.15, 1.0, 1.0])
+        energies, heights, classes = panels
+        _demanded_energies(energies, problem, rows)
+        _needed_heights(heights, problem, rows)
+        _class_stretches(classes, rows)
+        for name, marker in zip(layouts, FENCE_MARKERS, strict=False):
+            _fences(energies, heights, classes, layouts[name], name, marker)
+        zone, road = problem.zone, problem.site.road
+        for axes in panels:
+            axes.axvspan(road.start, road.end, color=ROAD, alpha=0.2, lw=0)
+            axes.axvspan(zone.start, zone.end, color=ZONE, alpha=0.12, lw=0)
+            axes.grid(alpha=0.25, axis="x")
+        room = 0.1 * (road.start - zone.start)
+        classes.set_xlim(zone.start - 0.5 * room, min(road.start + room, road.end))
+        classes.set_xlabel("x [m]")
+        handles: dict[str, Any] = {}
+        for axes in panels:
+            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+                handles.setdefault(label, handle)
+        figure.legend([*handles.values()], [*handles], loc="outside lower center", ncols=3,
+                      frameon=False, fontsize=10)  # fmt: skip
+        save(figure, path)
+
+
+def _values(rows: Sequence[Mapping[str, Any]], name: str) -> Floats:
+    return np.array([row[name] for row in rows], dtype=np.float64)
+
+
+def _demanded_energies(
+    axes: Axes, problem: DesignProblem, rows: Sequence[Mapping[str, Any]]
+) -> None:
+    """Draw the demanded energy over bands of the classes."""
+    x, energy = _values(rows, "x_m"), _values(rows, "demanded_energy_kJ")
+    top = 1.5 * max(CLASSES[-1], float(energy.max(initial=0.0)))
+    bottom = min(0.5 * CLASSES[0], 0.7 * float(energy.min(initial=CLASSES[0])))
+    edges = [bottom, *CLASSES, top]
+    for i, (low, high) in enumerate(pairwise(edges)):
+        axes.axhspan(low, high, color="#9aa7b5" if i % 2 else "#dde3ea", alpha=0.35, lw=0)
+        words = f"{high:,g} kJ" if i < len(CLASSES) else "no class"
+        axes.annotate(words, (1.005, (low * high) ** 0.5), xycoords=("axes fraction", "data"),
+                      va="center", fontsize=8, color=NOTE, annotation_clip=False)  # fmt: skip
+    axes.set_yscale("log")
+    axes.set_ylim(bottom, top)
+    plain_numbers(axes.yaxis, (1.0, 2.0, 5.0))
+    speed = _values(rows, "velocity_m_s")
+    least, most = (
+        energy * (_values(rows, f"velocity_{end}_m_s") / speed) ** 2 for end in ("low", "high")
+    )
+    axes.fill_between(x, least, most, color=DEMAND, alpha=0.2, lw=0, label="95 % interval")
+    axes.plot(x, energy, color=DEMAND, linewidth=1.8, label="demand with partial factors")
+    factors = problem.site.rule
+    axes.set_title(
+        f"demanded energy of a fence at {factors.level}, with all partial factors [kJ]; bands: "
+        "least class with this energy", loc="left", fontsize=10,
+    )  # fmt: skip
+
+
+def _needed_heights(axes: Axes, problem: DesignProblem, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Draw the needed height, and the greatest heights of the classes."""
+    x, height = _values(rows, "x_m"), _values(rows, "needed_height_m")
+    factors, centre = problem.site.rule, _values(rows, "height_m")
+    least, most = (
+        height + factors.velocity * factors.height * (_values(rows, f"height_{end}_m") - centre)
+        for end in ("low", "high")
+    )
+    axes.fill_between(x, least, most, color=DEMAND, alpha=0.2, lw=0)
+    axes.plot(x, height, color=DEMAND, linewidth=1.8)
+    highest: dict[float, int] = {}
+    for name, row in FENCE_CLASSES.items():
+        highest.setdefault(row.height, name)
+    limit = min(problem.zone.max_height, max(highest))
+    for tall, name in highest.items():
+        axes.axhline(tall, color="#9aa7b5", linewidth=0.8)
+        axes.annotate(f"{tall:g} m, {name:,} kJ", (1.005, tall), va="center", fontsize=7,
+                      xycoords=("axes fraction", "data"), color=NOTE,
+                      annotation_clip=False)  # fmt: skip
+    axes.axhline(limit, color="#b5382a", linewidth=1.4, linestyle="--",
+                 label="greatest height here")  # fmt: skip
+    top = max(TALL, 1.4 * float(height.min(initial=math.inf))) if len(height) else TALL
+    axes.set_ylim(0.0, top)
+    words = f"; the curve reaches {height.max():.0f} m" if height.max(initial=0.0) > top else ""
+    axes.set_title(
+        "needed height of a fence [m]; lines: greatest height of fences and the class from which "
+        f"it is made{words}", loc="left", fontsize=10,
+    )  # fmt: skip
+
+
+def _class_stretches(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Draw for each class where it satisfies the rule, and where only its energy suffices."""
+    x, energy = _values(rows, "x_m"), _values(rows, "demanded_energy_kJ")
+    step = float(np.diff(x).min(initial=1.0)) if len(x) > 1 else 1.0
+    for i, name in enumerate(CLASSES):
+        fits = np.array([f"{name}" in row["classes_that_fit_kJ"].split() for row in rows])
+        strong = "its energy suffices, but not height or clearance"
+        for chosen, colour, label in (
+            ((energy < name) & ~fits, ENERGY_ONLY, strong),
+            (fits, FITS, "a fence of this class satisfies the rule"),
+        ):
+            starts = np.maximum(x[chosen] - 0.5 * step, x[0])
+            spans = np.minimum(x[chosen] + 0.5 * step, x[-1]) - starts
+            bars = [*zip(starts.tolist(), spans.tolist(), strict=True)]
+            axes.broken_barh(bars, (i - 0.4, 0.8), color=colour, lw=0, label=label)
+    axes.set_yticks(range(len(CLASSES)), [f"{name:,}" for name in CLASSES])
+    axes.set_ylim(-0.6, len(CLASSES) - 0.4)
+    axes.set_title("where would a fence of this class [kJ] do?", loc="left", fontsize=10)
+
+
+def _fences(
+    energies: Axes, heights: Axes, classes: Axes, layout: Layout, name: str, marker: str
+) -> None:
+    """Draw the fences of a layout."""
+    for barrier in standing(layout):
+        if isinstance(barrier, Fence) and barrier.energy_class is not None:
+            style: dict[str, Any] = {
+                "marker": marker, "color": BARRIER, "markersize": 9, "linestyle": "none",
+                "markeredgecolor": "white", "label": f"fence: {name}", "zorder": 5,
+            }  # fmt: skip
+            energies.plot(barrier.x, barrier.energy_class, **style)
+            heights.plot(barrier.x, barrier.height, **style)
+            classes.plot(barrier.x, CLASSES.index(barrier.energy_class), **style)

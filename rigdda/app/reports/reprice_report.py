@@ -8,7 +8,7 @@ from typing import Any
 import rigdda
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.app.design_study import SHED
-from rigdda.app.reports import findings, frontier_report, pictures
+from rigdda.app.reports import design_report, findings, pictures
 from rigdda.app.reports.tables import known_risks, write_risks, write_rows
 from rigdda.app.reports.wording import number
 from rigdda.app.reprice import BEST, Change, Repriced
@@ -25,8 +25,8 @@ def write(done: Repriced, folder: Path) -> None:
     rigdda.save_layout(done.chosen.evaluation.layout, folder / "layout.toml")
     points = [pictures.Point.of(case.name, case.evaluation) for case in done.cases]
     shed = pictures.Point(SHED, done.problem.site.shed(), 0.0, (0.0, 0.0))
-    pictures.cost(folder / "cost.png", [], [*points, shed])
-    frontier_report.write(folder, done.problem, done.frontier)
+    pictures.cost_against_risk(folder / "cost.png", [], [*points, shed])
+    design_report.write_frontier(folder, done.problem, done.frontier)
 
 
 def rows(done: Repriced) -> list[dict[str, Any]]:

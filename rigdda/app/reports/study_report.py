@@ -255,7 +255,7 @@ def write(folder: Path, results: StudyResults, seed: int) -> None:
 
 def sections(path: Path, results: StudyResults, seed: int) -> None:
     """Write a PNG with the slope and trajectories of the same releases for every layout."""
-    site, seeds = results.site, range(seed, seed + pictures.DRAWN)
+    site, seeds = results.site, range(seed, seed + pictures.DRAWN_TRAJECTORIES)
     panels = []
     for one in results.layouts:
         shown = [pictures.trajectories(site, one.layout, name, seeds) for name in site.event_names]

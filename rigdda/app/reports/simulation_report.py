@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Layout, Site
-from rigdda.app.reports import pictures, station_pictures, stations
+from rigdda.app.reports import pictures, stations
 from rigdda.app.reports.stations import Passing, Rows
 from rigdda.passages import check_stations, ends
 
@@ -71,9 +71,9 @@ def write(folder: Path, passing: Passing, layout: Layout, asked: Floats) -> tupl
     stations.write(folder / "run_out", reached)
     stations.write(folder / "stopping", rest)
     stations.write(folder / "stops", stations.stops(passing))
-    pictures.released(folder / "section.png", passing, layout, slope)
-    station_pictures.along_slope(folder / "along_slope.png", passing, slope)
-    station_pictures.run_out(folder / "run_out.png", passing, reached)
+    pictures.released_slope(folder / "section.png", passing, layout, slope)
+    pictures.along_slope(folder / "along_slope.png", passing, slope)
+    pictures.run_out(folder / "run_out.png", passing, reached)
     for place, x in zip(places, asked.tolist(), strict=True):
-        station_pictures.station(folder / f"{_picture(x)}.png", passing, place, rows)
+        pictures.station(folder / f"{_picture(x)}.png", passing, place, rows)
     return rows, rest

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from rich.table import Table
 
+
 FILES = ("budgets.csv", "sections.csv", "fronts.csv", "priorities.csv", "gain.png", "strip.png")
 """Files that `write` writes besides the folder `layouts`."""
 

@@ -27,7 +27,6 @@ SCRIPTS = (
     "fig10_modes",
     "fig13_deposit",
     "fig14_retained",
-    "ablation",
     "outcome_step",
     "run_out_step",
     "fence_step",

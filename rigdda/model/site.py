@@ -37,7 +37,6 @@ from rigdda.ground.terrain import Roughness
 from rigdda.model import existing, forest, loose_blocks, site_names
 from rigdda.model.block import Block
 from rigdda.model.outcome import Outcome
-from rigdda.model.random_streams import stream
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
 from rigdda.model.site_generator import generate
@@ -237,7 +236,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if rock.band is None:
             normal, blocks = _cut(msgspec.json.encode(rock), seed, index)
         else:
-            rng = stream((seed, index))
+            rng = np.random.default_rng((seed, index))
             normal = rng.standard_normal()
             areas, drawn = loose_blocks.draw(rng, rock, what, loose_blocks.line(self.slope.points))
             blocks = tuple(drawn)
@@ -619,7 +618,7 @@ def _ground(
     """
     strengths: tuple[tuple[float, float, float], ...] = ()
     if any(surface.varies for surface in site.surfaces.values()):
-        rng = stream((seed, index, STRENGTHS))
+        rng = np.random.default_rng((seed, index, STRENGTHS))
         drawn = rng.standard_normal((len(site.surfaces), 3)).tolist()
         strengths = tuple((_cut_off(a), _cut_off(b), _cut_off(c)) for a, b, c in drawn)
     amplitude = {name: s.roughness for name, s in site.surfaces.items() if s.roughness > 0.0}
@@ -639,7 +638,7 @@ def _stems(
     """
     if not site.forest:
         return ()
-    rng, found = stream((seed, index, STEMS)), []
+    rng, found = np.random.default_rng((seed, index, STEMS)), []
     for block in blocks:
         area, centre, _ = polygon_properties(block.vertices)
         found.append(forest.stems(rng, site.forest, float(centre[0]), math.sqrt(area)))

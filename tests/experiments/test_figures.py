@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from experiments import fig04_deformable, fig05_solvers, pile
 from experiments import all as every
+from experiments import fig04_deformable, fig05_solvers, pile
 from experiments.script import Number
 
 SLOW = {

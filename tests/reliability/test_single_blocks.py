@@ -14,7 +14,6 @@ from rigdda import BadInput, Block, Ditch, Embankment, Fence, Layout, Site, Wall
 from rigdda.dynamics.packing import pack_interfaces
 from rigdda.ground.surface import Interface
 from rigdda.model.interfaces import Meetings
-from rigdda.model.random_streams import stream
 from rigdda.model.site_tables import Scatter
 from rigdda.releases import Batch, SingleReleases, can_share
 
@@ -117,12 +116,3 @@ def test_order_changes_no_outcome():
     assert batch.outcomes(releases[::-1]) == found[::-1]
     assert [batch.outcome(*release) for release in releases] == found
     assert all(dataclasses.is_dataclass(outcome) for outcome in found)
-
-
-@pytest.mark.parametrize(
-    "seed", [(0,), (7, 0), (7, 2, 1), (2**32 - 1, 5), (2**32, 5), (2**70, 1), (1, 2, 3, 4, 5)]
-)
-def test_streams_are_those_of_numpy(seed):
-    found, wanted = stream(seed), np.random.default_rng(list(seed))
-    assert found.bit_generator.state == wanted.bit_generator.state
-    np.testing.assert_array_equal(found.standard_normal(5), wanted.standard_normal(5))

@@ -23,7 +23,7 @@ from experiments.corridor_pools import FOLDER, Pool, pools
 from experiments.script import Number, interval, main, say, write
 from rigdda import Corridor, CorridorSection, Layout
 from rigdda.agents.corridor import programme
-from rigdda.agents.corridor.planning import CHOICE, Option, Planner
+from rigdda.agents.corridor.planning import CHOICE_SHARE, Option, Planner
 from rigdda.agents.corridor.programme import Options
 from rigdda.envs import CorridorProblem, Evaluation
 
@@ -85,7 +85,7 @@ class Replay(Planner):
     """A planner whose releases are drawn from a population with replacement."""
 
     def __init__(self, population: Population, releases: int, seed: int, margin: bool):
-        super().__init__(population.problem, int(releases / CHOICE), seed, margin=margin)
+        super().__init__(population.problem, int(releases / CHOICE_SHARE), seed, margin=margin)
         self._population, self._repeat = population, seed
         self._drawn: dict[tuple[int, str], list[int]] = {}
 

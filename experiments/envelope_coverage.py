@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from experiments.script import Number, main, say, write
 from rigdda import Site
-from rigdda.app.reports.stations import LEVELS, QUANTITIES, Passing
+from rigdda.app.reports.stations import QUANTILE_LEVELS, QUANTITIES, Passing
 from rigdda.envs.quantiles import quantiles
 from rigdda.passages import passages
 
@@ -54,7 +54,7 @@ def coverage(event: str, plan: Plan) -> list[dict[str, Any]]:
     """Return how many runs hold each quantile of an event, a row for each."""
     site = Site.load(SITE)
     truth = known(site, event, plan.reference, plan.each * plan.runs)
-    held = np.zeros((len(QUANTITIES), len(LEVELS)), dtype=int)
+    held = np.zeros((len(QUANTITIES), len(QUANTILE_LEVELS)), dtype=int)
     open_ended = np.zeros_like(held)
     for run in range(plan.runs):
         seeds = range(run * plan.each, (run + 1) * plan.each)
@@ -62,8 +62,8 @@ def coverage(event: str, plan: Plan) -> list[dict[str, Any]]:
         passing = Passing.of(site, (), event, found)
         for i, (name, quantity) in enumerate(QUANTITIES.items()):
             sample = passing.sample(event, found.table, quantity.of(found.table))
-            for k, one in enumerate(quantiles(sample, LEVELS)):
-                true = np.quantile(truth[name], LEVELS[k], method="inverted_cdf")
+            for k, one in enumerate(quantiles(sample, QUANTILE_LEVELS)):
+                true = np.quantile(truth[name], QUANTILE_LEVELS[k], method="inverted_cdf")
                 held[i, k] += not (one.low > true or one.high < true)
                 open_ended[i, k] += bool(np.isnan([one.low, one.high]).any())
     return [
@@ -71,7 +71,7 @@ def coverage(event: str, plan: Plan) -> list[dict[str, Any]]:
          "releases": plan.each, "reference": plan.reference,
          "reference_value": float(np.quantile(truth[name], level, method="inverted_cdf")),
          "held": int(held[i, k]), "lack_an_end": int(open_ended[i, k])}
-        for i, name in enumerate(QUANTITIES) for k, level in enumerate(LEVELS)
+        for i, name in enumerate(QUANTITIES) for k, level in enumerate(QUANTILE_LEVELS)
     ]  # fmt: skip
 
 

@@ -72,7 +72,7 @@ def main(splits: tuple[str, ...], count: int, checked: int, out: Path) -> None:
 def keys(site: Site) -> tuple[str, str]:
     """Return the keys of the values of a site."""
     key = outcome_cache.fingerprint(site).hex()
-    return f"{ensemble.NAME}-{key}", f"{envelope.NAME}-{key}"
+    return f"{ensemble.STORED_AS}-{key}", f"{envelope.STORED_AS}-{key}"
 
 
 def statistics(site: Site) -> dict[str, Any]:

@@ -73,7 +73,7 @@ def without_final(problem: DesignProblem, simulations: int, seed: int) -> Design
     menu, track = Menu(problem), Track(ledger)
     surrogate = race.forecast_pool(ledger, menu, unsearched(problem, menu))
     track.expect = surrogate.expect
-    race.explore(track, surrogate, int((race.EXPLORE + race.FINAL) * simulations))
+    race.explore(track, surrogate, int((race.EXPLORE + race.FINAL_SHARE) * simulations))
     chosen = surrogate.best(1)[0] if surrogate.value().min() < 1.0 else ()
     return ledger.result(ledger.evaluate(chosen, "report", ledger.left))
 

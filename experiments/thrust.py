@@ -23,7 +23,7 @@ from experiments.script import BLUE, GREEN, RED, Number, draw, main
 from experiments.study import Row, tabulate
 from rigdda import Barrier, Embankment, Fence, GravityWall, Site
 from rigdda.barriers import FENCE_CLASSES, describe
-from rigdda.barriers.base import HEIGHTS, SLENDER
+from rigdda.barriers.base import CATALOGUE_HEIGHTS, SLENDER
 from rigdda.releases import release_many
 
 SITES = {"shu-hwa": 83.6, "quick": 23.0}
@@ -41,7 +41,7 @@ def barriers(x: float, highest: float) -> Iterator[Barrier]:
     """Yield the catalogue barriers of every height up to the highest one, at a chainage [m]."""
     for name, row in FENCE_CLASSES.items():
         yield Fence(x, row.height, energy_class=name)
-    for h in (0.6, *HEIGHTS):
+    for h in (0.6, *CATALOGUE_HEIGHTS):
         if h <= highest:
             yield Embankment(x, h)
             yield GravityWall(x, h, max(0.5, SLENDER * h))

@@ -34,7 +34,7 @@ from .model.settings import Settings
 from .model.site import Site
 from .model.site_tables import Drawn, Event
 from .model.source import Source
-from .model.traffic import Toll, Traffic
+from .model.traffic import Traffic
 from .releases import release, release_many, release_outcome
 from .trajectory import Trajectories, trajectories, trajectory_parts
 
@@ -82,7 +82,6 @@ __all__ = [
     "Source",
     "Surface",
     "Terrain",
-    "Toll",
     "Traffic",
     "Trajectories",
     "Wall",

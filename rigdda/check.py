@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda.errors import BadInput
 
-LARGEST = 1e15
+LARGEST_NUMBER = 1e15
 """Greatest accepted magnitude of a number. No quantity of a slope in SI units comes near it, and
 products of such numbers remain finite."""
 
@@ -37,7 +37,7 @@ def number(
     Raises
     ------
     BadInput
-        If it is not a number, not finite, larger than `LARGEST` in magnitude or outside the
+        If it is not a number, not finite, larger than `LARGEST_NUMBER` in magnitude or outside the
         interval. Booleans and arrays are not accepted, although Python can convert them.
     """
     if isinstance(value, bool | np.bool_ | np.ndarray):
@@ -52,18 +52,20 @@ def number(
         raise BadInput(field, value, "give a number, not a text")
     if not math.isfinite(out):
         raise BadInput(field, value, "give a finite number")
-    if abs(out) > LARGEST:
-        raise BadInput(field, value, f"give a number of at most {LARGEST:g} in magnitude")
+    if abs(out) > LARGEST_NUMBER:
+        raise BadInput(field, value, f"give a number of at most {LARGEST_NUMBER:g} in magnitude")
     if out < low or out > high or (open_low and out == low):
         bounds = f"above {low:g}" if open_low else f"of at least {low:g}"
         if math.isfinite(high):
             bounds += f" and at most {high:g}"
-        mend = f"give a number {bounds}" + (f" [{unit}]" if unit else "")
-        raise BadInput(field, value, mend)
+        hint = f"give a number {bounds}" + (f" [{unit}]" if unit else "")
+        raise BadInput(field, value, hint)
     return out
 
 
-PLAIN = re.compile(r"\s*[+-]?(([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|nan|inf(inity)?)\s*", re.I)
+DECIMAL_NUMBER = re.compile(
+    r"\s*[+-]?(([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|nan|inf(inity)?)\s*", re.I
+)
 """A number as tables have it. Python's float would also read 1_20, as 120, and digits of other
 scripts."""
 
@@ -77,7 +79,7 @@ def parsed(text: str) -> float:
         If it is not a plain number: underscores between digits, which Python permits in its own
         source text, are typing errors here.
     """
-    if PLAIN.fullmatch(text) is None:
+    if DECIMAL_NUMBER.fullmatch(text) is None:
         raise ValueError(f"{text!r} is not a number")
     return float(text)
 
@@ -92,8 +94,8 @@ def distinct(field: str, names: Sequence[str]) -> None:
     """
     for name in names:
         if names.count(name) > 1:
-            mend = f"give each column a different name: {names.count(name)} have this one"
-            raise BadInput(field, name, mend)
+            hint = f"give each column a different name: {names.count(name)} have this one"
+            raise BadInput(field, name, hint)
 
 
 def boolean(field: str, value: Any) -> bool:
@@ -220,10 +222,10 @@ def points(field: str, value: ArrayLike, least: int) -> NDArray[np.float64]:
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if bad.size:
         raise BadInput(f"{field}[{bad[0]}]", array[bad[0]].tolist(), "give finite coordinates")
-    far = np.flatnonzero((np.abs(array) > LARGEST).any(axis=1))
+    far = np.flatnonzero((np.abs(array) > LARGEST_NUMBER).any(axis=1))
     if far.size:
-        mend = f"give coordinates of at most {LARGEST:g} in magnitude"
-        raise BadInput(f"{field}[{far[0]}]", array[far[0]].tolist(), mend)
+        hint = f"give coordinates of at most {LARGEST_NUMBER:g} in magnitude"
+        raise BadInput(f"{field}[{far[0]}]", array[far[0]].tolist(), hint)
     array.setflags(write=False)
     return array
 

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-WIDTH = 8.0
+IMAGE_WIDTH = 8.0
 """Width of an image [inch], at 100 pixels per inch."""
 
-LOWEST, HIGHEST = 2.6, 5.5
+LEAST_IMAGE_HEIGHT, GREATEST_IMAGE_HEIGHT = 2.6, 5.5
 """Minimum and maximum height of an image [inch], which otherwise follows from the shape of the
 section."""
 
@@ -89,8 +89,10 @@ def png(section: Section, title: str = "") -> bytes:
     from matplotlib.figure import Figure
 
     wide, high = np.ptp(section.ground, axis=0)
-    height = min(max(LOWEST, 1.6 + WIDTH * high / wide), HIGHEST)
-    figure = Figure((WIDTH, height), dpi=100, layout="constrained")  # not registered with pyplot
+    height = min(max(LEAST_IMAGE_HEIGHT, 1.6 + IMAGE_WIDTH * high / wide), GREATEST_IMAGE_HEIGHT)
+    figure = Figure(
+        (IMAGE_WIDTH, height), dpi=100, layout="constrained"
+    )  # not registered with pyplot
     axes = figure.subplots()
     draw(axes, section)
     if title:

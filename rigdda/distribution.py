@@ -95,8 +95,8 @@ def connected(address: str) -> Iterator[Executor]:
     """
     found = ADDRESS.match(address)
     if not found:
-        mend = "give the address of a Dask scheduler as dask://HOST:PORT"
-        raise BadInput("executor", address, mend)
+        hint = "give the address of a Dask scheduler as dask://HOST:PORT"
+        raise BadInput("executor", address, hint)
     try:
         from distributed import Client
     except ModuleNotFoundError:
@@ -104,8 +104,8 @@ def connected(address: str) -> Iterator[Executor]:
     try:
         client = Client(f"tcp://{found['host']}:{found['port']}", timeout=PATIENCE)
     except OSError as error:
-        mend = f"start the scheduler first: dask scheduler --port {found['port']} ({error})"
-        raise BadInput("executor", address, mend) from None
+        hint = f"start the scheduler first: dask scheduler --port {found['port']} ({error})"
+        raise BadInput("executor", address, hint) from None
     try:
         where = f"{found['host']}:{found['port']}"
         if not client.scheduler_info()["workers"]:
@@ -213,16 +213,16 @@ class _Scheduler(Executor):
         if not what:
             self._returned()
             return
-        mend = f"start one by {_start(self._where)}"
+        hint = f"start one by {_start(self._where)}"
         if self._deserted is None:
             self._deserted = time.monotonic()
             _tell(
-                f"{what} on tcp://{self._where}: waiting for one; {mend}, or stop with Ctrl+C "
+                f"{what} on tcp://{self._where}: waiting for one; {hint}, or stop with Ctrl+C "
                 f"(gives up after {DESERTED / 60.0:.3g} min)"
             )
         elif time.monotonic() - self._deserted > DESERTED:
             raise Error(
-                f"{what} on tcp://{self._where} for {DESERTED / 60.0:.3g} min: {mend}, and run the "
+                f"{what} on tcp://{self._where} for {DESERTED / 60.0:.3g} min: {hint}, and run the "
                 "command again"
             )
 

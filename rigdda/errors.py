@@ -18,17 +18,17 @@ class BadInput(Error, ValueError):
         Path of the invalid field, for example ``block 3: vertices``.
     value : object
         The value of the field.
-    mend : str
+    hint : str
         What to write instead.
     """
 
-    def __init__(self, field: str, value: object, mend: str):
-        super().__init__(field, value, mend)
-        self.field, self.value, self.mend = field, value, mend
+    def __init__(self, field: str, value: object, hint: str):
+        super().__init__(field, value, hint)
+        self.field, self.value, self.hint = field, value, hint
 
     def __str__(self) -> str:
         field, text = " ".join(self.field.split()), repr(self.value).replace("\n", " ")
-        return f"{field} = {text if len(text) <= 120 else text[:117] + '...'}: {self.mend}"
+        return f"{field} = {text if len(text) <= 120 else text[:117] + '...'}: {self.hint}"
 
 
 class Diverged(Error, RuntimeError):

@@ -134,12 +134,12 @@ def checked(table: type[msgspec.Struct], value: Any, where: str = "") -> dict[st
             if key in getattr(table, "retired", {}):
                 raise BadInput(f"{prefix}{key}", value[key], table.retired[key])  # type: ignore[attr-defined]
             near = difflib.get_close_matches(str(key), checks, 1)
-            mend = f"did you mean {near[0]}?" if near else f"use one of {', '.join(checks)}"
-            raise BadInput(f"{prefix}{key}", value[key], f"there is no such key: {mend}")
+            hint = f"did you mean {near[0]}?" if near else f"use one of {', '.join(checks)}"
+            raise BadInput(f"{prefix}{key}", value[key], f"there is no such key: {hint}")
     for field in described(table):
         if field.needed and field.name not in value:
-            mend = f"add this key, which has no default: {field.text}"
-            raise BadInput(prefix + field.name, None, mend)
+            hint = f"add this key, which has no default: {field.text}"
+            raise BadInput(prefix + field.name, None, hint)
     return {key: checks[key][0](prefix + key, item) for key, item in value.items()}
 
 
@@ -321,7 +321,7 @@ def _bare(kind: kinds.Type) -> kinds.Type:
             return kind
 
 
-PLAIN = {kinds.FloatType: "float", kinds.IntType: "int", kinds.StrType: "str"}
+TYPE_WORDS = {kinds.FloatType: "float", kinds.IntType: "int", kinds.StrType: "str"}
 
 
 def _words(kind: kinds.Type) -> str:
@@ -340,7 +340,7 @@ def _words(kind: kinds.Type) -> str:
         case kinds.StructType():
             return "table"
         case _:
-            return PLAIN.get(type(kind), "str")
+            return TYPE_WORDS.get(type(kind), "str")
 
 
 def _plural(words: str) -> str:

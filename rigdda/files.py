@@ -25,8 +25,8 @@ def read(field: str, path: Path) -> str:
     except OSError as error:
         raise BadInput(field, str(path), f"name a file to read ({error.strerror})") from None
     except UnicodeDecodeError as error:
-        mend = f"save it as UTF-8: byte {error.start} is not ({error.reason})"
-        raise BadInput(field, str(path), mend) from None
+        hint = f"save it as UTF-8: byte {error.start} is not ({error.reason})"
+        raise BadInput(field, str(path), hint) from None
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:

@@ -92,8 +92,8 @@ def cache_directory() -> Path:
         home = find()
         if home is not None and _is_writable(home / name):
             return home / name
-    mend = "set XDG_CACHE_HOME or TMPDIR to a folder that can be written"
-    raise Error(f"there is no place for compiled kernels: {mend}")
+    hint = "set XDG_CACHE_HOME or TMPDIR to a folder that can be written"
+    raise Error(f"there is no place for compiled kernels: {hint}")
 
 
 def _cache_home() -> Path | None:

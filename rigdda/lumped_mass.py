@@ -95,19 +95,19 @@ def lumped(
     """
     site, layout = as_site(site), as_layout(layout)
     if site.forest:
-        mend = "remove it, or use the block model: points do not strike stems"
-        raise BadInput("forest", f"{len(site.forest)} forests", mend)
+        hint = "remove it, or use the block model: points do not strike stems"
+        raise BadInput("forest", f"{len(site.forest)} forests", hint)
     new = len(layout)
     layout = site.as_built(layout)
     for i, barrier in enumerate(layout):
         if not isinstance(barrier, Earthwork | Mesh | Removal):
             if i >= new:
-                mend = "use the block model: points only react to ditches and embankments"
-                raise BadInput(f"existing {barrier.words}", f"x = {barrier.x:g}", mend)
-            mend = (
+                hint = "use the block model: points only react to ditches and embankments"
+                raise BadInput(f"existing {barrier.words}", f"x = {barrier.x:g}", hint)
+            hint = (
                 "leave it out, or use the block model: points only react to ditches and embankments"
             )
-            raise BadInput(f"barriers[{i}]", barrier.kind, mend)
+            raise BadInput(f"barriers[{i}]", barrier.kind, hint)
     site.built(layout, 1.0)
     check_known(site.surfaces, "barrier surface", site.soil)
     own = list(seeds) if isinstance(seeds, Iterable) else []
@@ -115,8 +115,8 @@ def lumped(
         raise BadInput("seeds", seeds, "give at least one seed")
     ground, _ = earthworks(site.profile, layout, site.soil)
     if (np.diff(ground.points[:, 0]) <= 0.0).any():
-        mend = "use the block model: points need ground without overhangs or vertical faces"
-        raise BadInput("slope.points", "an overhang", mend)
+        hint = "use the block model: points need ground without overhangs or vertical faces"
+        raise BadInput("slope.points", "an overhang", hint)
     starts, areas, densities, release, shifts = [], [], [], [], []
     for k, seed in enumerate(own):
         drawn = site.draw(seed, event)

@@ -21,7 +21,7 @@ from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
 from rigdda.measurement import AT_REST
 from rigdda.model.site import Site
-from rigdda.releases import SENT, TOGETHER, Batch, as_site, divided
+from rigdda.releases import MOST_PER_THREAD, SENT, Batch, as_site, divided
 
 PASSAGE = np.dtype(
     [
@@ -73,7 +73,7 @@ STATES = ("at rest", "moving", "left the profile")
 """States of a block at the end: at rest; still moving when `motion.duration` was over, so that it
 would stop further downhill; beyond the end of the ground, so that nobody knows where it stops."""
 
-AT_END, MOVING, LEFT = range(3)
+AT_END, IN_MOTION, HAS_LEFT = range(3)
 
 MEMORY = 64e6
 """Size of the frames of a part of a run [bytes]."""
@@ -157,8 +157,8 @@ def check_stations(site: Site, stations: Sequence[float]) -> NDArray[np.float64]
     found = set()
     for x in check.sequence("stations", stations, (int, float), "a chainage"):
         if not low < x < high:
-            mend = f"give a chainage within the profile, between {low:g} and {high:g} m"
-            raise BadInput("station", x, mend)
+            hint = f"give a chainage within the profile, between {low:g} and {high:g} m"
+            raise BadInput("station", x, hint)
         found.add(float(x))
     return np.array(sorted(found), dtype=np.float64)
 
@@ -220,7 +220,7 @@ def _in_threads(
     threads: int,
 ) -> Passages:
     """Return the passages of releases, computed in threads of this process."""
-    most = max(1, min(TOGETHER, len(releases) // (4 * threads)))
+    most = max(1, min(MOST_PER_THREAD, len(releases) // (4 * threads)))
     queue = iter(divided([(site, built, *release) for release in releases], most))
 
     def work(_: int) -> list[tuple[list[int], Passages]]:
@@ -270,7 +270,7 @@ class _Watch:
         stops["block"] = np.arange(len(stops))
         end = ends(self._site)[1]
         stops["mass"], stops["x"] = mass, np.minimum(x, end)
-        stops["state"] = np.where(x >= end, LEFT, np.where(speed < AT_REST, AT_END, MOVING))
+        stops["state"] = np.where(x >= end, HAS_LEFT, np.where(speed < AT_REST, AT_END, IN_MOTION))
         table["event"] = stops["event"] = number
         return Passages(self._lines, (seed,), np.array([number]), table, stops)
 

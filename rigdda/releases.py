@@ -414,12 +414,12 @@ def outcomes(
     return found
 
 
-MANY = 0.05
+CUT_OFF_SHARE = 0.05
 """Fraction of releases that may be cut off without a warning; it allows for occasional late
 blocks."""
 
 
-TOGETHER = 16
+MOST_PER_THREAD = 16
 """Maximum number of releases that a thread takes at a time. Releases of events with at least this
 mean number of blocks are taken one by one."""
 
@@ -542,7 +542,7 @@ def check_duration(sites: Sequence[Site], outcomes: Sequence[Outcome]) -> None:
         If it does, and more than one release.
     """
     cut = [site for site, outcome in zip(sites, outcomes, strict=True) if outcome.cut_off]
-    if len(cut) > max(1.0, MANY * len(outcomes)):
+    if len(cut) > max(1.0, CUT_OFF_SHARE * len(outcomes)):
         _doubt_duration(cut[0])
 
 
@@ -562,7 +562,7 @@ def by_size(jobs: Sequence[CheckedJob]) -> tuple[list[int], list[int]]:
             every = site.events if isinstance(site, Site) else ()
             counts[id(site)] = {e.name: e.block_count(site.source(e.source)) for e in every}
         name = _tried(site.pick, seed) if event is None and counts[id(site)] else event
-        if isinstance(name, str) and counts[id(site)].get(name, 0.0) >= TOGETHER:
+        if isinstance(name, str) and counts[id(site)].get(name, 0.0) >= MOST_PER_THREAD:
             large.setdefault((id(site), layout), []).append(place)
         else:
             small.append(place)
@@ -586,7 +586,7 @@ def _in_threads(jobs: Sequence[CheckedJob], threads: int) -> list[Outcome | Erro
         site, layout, _, _ = jobs[place]
         groups.setdefault((id(site), layout), []).append(place)
     threads = max(1, min(threads, len(jobs)))
-    most = max(1, min(TOGETHER, len(jobs) // (8 * threads)))
+    most = max(1, min(MOST_PER_THREAD, len(jobs) // (8 * threads)))
     parts = [[place] for place in large]
     parts += [group[i : i + most] for group in groups.values() for i in range(0, len(group), most)]
     queue = iter(parts)

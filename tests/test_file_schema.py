@@ -122,7 +122,7 @@ def test_malformed_sites_are_refused_by_both(old, new, field, mend, tmp_path):
     with pytest.raises(BadInput) as caught:
         Site.parse(text, "site")
     assert caught.value.field == field
-    assert mend in caught.value.mend
+    assert mend in caught.value.hint
 
 
 @pytest.mark.parametrize(

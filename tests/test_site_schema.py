@@ -109,7 +109,7 @@ def test_what_cannot_be_meant_is_refused(old, new, field, mend, tmp_path):
 def test_ground_that_ends_too_early_is_told(tmp_path):
     error = refused(tmp_path, "quick", "[80.0, -2.0]", "[60.0, -2.0]")
     assert error.field == "slope.points[10]"
-    assert "at least x = 74.8, 30 m beyond the road" in error.mend
+    assert "at least x = 74.8, 30 m beyond the road" in error.hint
 
 
 @pytest.mark.parametrize("value", [True, np.True_, np.array(5.0), np.array([5.0])])
@@ -321,12 +321,12 @@ def test_events_say_each_thing_once(old, new, field, mend, tmp_path):
 
 def test_only_a_mass_has_an_area_to_be_cut_to(tmp_path):
     error = refused(tmp_path, "verge", "band = [1.0, 2.8]", "band = [1.0, 2.8]\nblock_area = 2.0")
-    assert error.field == "sources.face.block_area" and "leave it out" in error.mend
+    assert error.field == "sources.face.block_area" and "leave it out" in error.hint
 
 
 def test_errors_of_stretches_name_the_surface(tmp_path):
     error = refused(tmp_path, "verge", "[61.0, -3.0]", "[58.0, -3.0]")
-    assert error.field == "slope.surfaces[2].end" and "soil" in error.mend
+    assert error.field == "slope.surfaces[2].end" and "soil" in error.hint
 
 
 def test_rock_far_below_the_ground_is_refused(tmp_path):
@@ -335,7 +335,7 @@ def test_rock_far_below_the_ground_is_refused(tmp_path):
     corners = msgspec.toml.decode(old)["polygon"]
     sunk = [[x, y - 500.0] for x, y in corners]
     error = refused(tmp_path, "quick", old, f"polygon = {sunk}")
-    assert error.field.startswith("sources.mass.polygon[") and "raise it" in error.mend
+    assert error.field.startswith("sources.mass.polygon[") and "raise it" in error.hint
 
 
 FOREST = """[[forest]]

@@ -192,7 +192,7 @@ def test_grounds_sources_and_zone_are_where_they_were_given(tmp_path):
 def test_each_value_is_commented_with_its_unit_and_how_sure_it_is(tmp_path):
     text, _ = compose("made", survey_file(tmp_path, table(TALUS)), SiteRequest(road=ROAD))
     lines = text.splitlines()
-    words = (new_site.SURVEYED, new_site.GIVEN, new_site.PLACEHOLDER, new_site.DEFAULT)
+    words = (new_site.SURVEYED, new_site.GIVEN, new_site.PLACEHOLDER, new_site.CHECK_DEFAULT)
     ends = tuple(f"{word}." for word in words)
     keys = [k for k, line in enumerate(lines) if " = " in line and line[0].islower()]
     assert len(keys) >= 60
@@ -211,7 +211,7 @@ def test_ground_that_ends_close_beyond_the_road_is_not_extended(tmp_path):
     with pytest.raises(BadInput) as caught:
         compose("short", survey_file(tmp_path, table(short)), SiteRequest(road=ROAD))
     assert caught.value.field == "--profile" and "140" in str(caught.value)
-    assert "add the point 151, 2.42105" in caught.value.mend
+    assert "add the point 151, 2.42105" in caught.value.hint
     text, _ = compose(
         "long", survey_file(tmp_path, table([*short, (151.0, 2.42105)])), SiteRequest(ROAD)
     )

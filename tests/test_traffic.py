@@ -163,7 +163,7 @@ def test_individual_risk_of_a_passage_is_that_of_one_vehicle() -> None:
     """One trip a year: (L_v + w) / V of the year times the falls of a year."""
     one = msgspec.structs.replace(TRAFFIC, commuter_trips=1.0, run_into=0.0)
     falls = 3.0  # per year on the section
-    fatal = falls * float(one.toll(True, False, 2.0, 1.0, 0.0).fatalities)
+    fatal = falls * float(one.consequences(True, False, 2.0, 1.0, 0.0).fatalities)
     by_hand = falls * (5.4 + 2.0) / 72_000.0 / (365.0 * 24.0) * 0.3
     assert fatal * one.person == pytest.approx(by_hand, rel=1e-12)
 
@@ -172,7 +172,7 @@ def test_fatalities_are_priced_into_z(site: Site) -> None:
     hit = outcome("block", 1.2, 1.0, 1.2, 0.0)
     before = site.bill((), hit).harm
     priced = msgspec.structs.replace(site, traffic=_with(fatality_value=5e6))
-    more = 5e6 * float(site.toll((), hit).fatalities)
+    more = 5e6 * float(site.traffic_consequences((), hit).fatalities)
     assert priced.bill((), hit).harm == pytest.approx(before + more, rel=1e-14)
     bare = msgspec.structs.replace(site, traffic=None)
     assert bare.bill((), hit) == site.bill((), hit)
@@ -213,7 +213,7 @@ def test_doubling_traffic_doubles_the_toll_but_not_the_individual_risk(
 ) -> None:
     one = _with(commuter_trips=trips)
     two = _with(commuter_trips=trips, vehicles_per_day=14_400.0)
-    tolls = [t.toll(True, lies, width, volume, 0.0) for t in (one, two)]
+    tolls = [t.consequences(True, lies, width, volume, 0.0) for t in (one, two)]
     for a, b in zip(*tolls, strict=True):
         assert float(b) == pytest.approx(2.0 * float(a), rel=1e-12)
     persons = [float(t.fatalities) * o.person for t, o in zip(tolls, (one, two), strict=True)]
@@ -227,7 +227,7 @@ def test_doubling_traffic_doubles_the_toll_but_not_the_individual_risk(
 )
 def test_risk_grows_with_every_exposure(name: str, value: float, factor: float) -> None:
     less, more = _with(**{name: value}), _with(**{name: value * factor})
-    tolls = [t.toll(True, True, 2.0, 3.0, 0.0).fatalities for t in (less, more)]
+    tolls = [t.consequences(True, True, 2.0, 3.0, 0.0).fatalities for t in (less, more)]
     assert tolls[1] >= tolls[0]
     each = [float(f) * t.person * t.occupancy for f, t in zip(tolls, (less, more), strict=True)]
     assert each[1] >= each[0] * (1.0 - 1e-12)

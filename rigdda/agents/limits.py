@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-RELEASES = 1_000_000
+JOB_RELEASES = 1_000_000
 """Largest number of releases, of layouts times releases, or of episodes of one job. A million
 take hours, determine a mean to a thousandth of the standard deviation, and need a few GB of
 memory."""
 
 
-SITES = 10_000
+COMPARED_SITES = 10_000
 """Largest number of random sites in a comparison. All of them are generated before the first
 search, which takes 1 ms each."""
 

@@ -25,7 +25,7 @@ from rigdda.agents.designers.protocol import Designer, DesignResult, Ledger, Pro
 from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem
 from rigdda.envs.observation import FIELDS, observe
-from rigdda.envs.site_sampling import KINDS, Slots
+from rigdda.envs.site_sampling import SAMPLED_KINDS, Slots
 from rigdda.files import atomic
 
 Floats = NDArray[np.float32]
@@ -130,7 +130,7 @@ def _in_order(raw: bytes) -> bytes:
 NAMES = tuple(FIELDS)
 """Arrays of an observation, in the order in which they are concatenated."""
 
-WIDTH = sum(FIELDS[name].size for name in NAMES)
+FEATURES = sum(FIELDS[name].size for name in NAMES)
 """Number of features."""
 
 
@@ -139,10 +139,10 @@ def features(seen: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
     return np.concatenate([seen[name] for name in NAMES]).astype(np.float32)
 
 
-SLOTS = Slots(KINDS, 3)
+SLOTS = Slots(SAMPLED_KINDS, 3)
 """Slots for the barriers that a policy decides on."""
 
-FINAL = 64
+MOST_FINAL_RELEASES = 64
 """Largest number of releases on which the designer evaluates its layout."""
 
 
@@ -176,7 +176,9 @@ def using(network: Network) -> Designer:
     ) -> DesignResult:
         ledger = Ledger(problem, simulations, seed, progress, store)
         layout = decide(network, problem)
-        return ledger.result(ledger.evaluate(layout, "report", min(FINAL, ledger.left)))
+        return ledger.result(
+            ledger.evaluate(layout, "report", min(MOST_FINAL_RELEASES, ledger.left))
+        )
 
     return design
 
@@ -214,7 +216,7 @@ def load(path: str | os.PathLike[str]) -> Network:
         observation to a layout.
     """
     network = Network.load(path)
-    sizes, wanted = network.sizes, (WIDTH, SLOTS.size)
+    sizes, wanted = network.sizes, (FEATURES, SLOTS.size)
     if not sizes or (sizes[0], sizes[-1]) != wanted:
         mend = "this is no policy of this version: name a file policy.safetensors that "
         mend += "`rigdda train` wrote"

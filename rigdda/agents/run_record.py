@@ -18,7 +18,7 @@ from rigdda import BadInput, Site
 from rigdda.envs.replay_record import Versions
 from rigdda.files import atomic
 
-FILE = "run.json"
+RECORD_FILE = "run.json"
 """Name of the file in a results folder."""
 
 
@@ -87,7 +87,7 @@ def read(folder: Path) -> dict[str, RunRecord]:
     BadInput
         If the file is damaged or was written by another version.
     """
-    file = folder / FILE
+    file = folder / RECORD_FILE
     if not file.is_file():
         return {}
     try:
@@ -100,10 +100,10 @@ def read(folder: Path) -> dict[str, RunRecord]:
 def write_records(folder: Path, records: dict[str, RunRecord]) -> None:
     """Write the records of a results folder; without any, there is no file."""
     if not records:
-        (folder / FILE).unlink(missing_ok=True)
+        (folder / RECORD_FILE).unlink(missing_ok=True)
         return
     text = msgspec.json.format(msgspec.json.encode(records), indent=2)
-    with atomic(folder / FILE) as part:
+    with atomic(folder / RECORD_FILE) as part:
         part.write_bytes(text + b"\n")
 
 

@@ -31,7 +31,7 @@ from rigdda.files import atomic
 
 Tick = Callable[[int], None]
 
-RELEASES = 64
+COMPARISON_RELEASES = 64
 """Number of releases of each site for comparing the trained policy with the initial one."""
 
 FIDELITY = "fast"
@@ -40,7 +40,7 @@ FIDELITY = "fast"
 SPLIT = "train"
 """Split with the sites for training and for the comparison."""
 
-FILES = ("training.json", "checkpoint.zip", "policy.safetensors")
+TRAINING_FILES = ("training.json", "checkpoint.zip", "policy.safetensors")
 """Files that a training writes into its folder besides the logs."""
 
 ANEW = "this is damaged: remove the training in its folder, or name another folder with --out"
@@ -67,7 +67,7 @@ class Terms:
 
     def __post_init__(self) -> None:
         check.integer("sites", self.sites, 2, len(sites.split(SPLIT)) // 2)
-        check.integer("episodes", self.episodes, 0, limits.RELEASES)
+        check.integer("episodes", self.episodes, 0, limits.JOB_RELEASES)
         check.integer("seed", self.seed, 0, limits.SEED)
 
     @property
@@ -146,7 +146,7 @@ def scaling(
 
 def examine(network: Network, problems: list[DesignProblem]) -> float:
     """Return the relative reduction of Z by the layouts of a policy, as a mean over problems."""
-    seeds = release_seeds("final", 0, RELEASES)
+    seeds = release_seeds("final", 0, COMPARISON_RELEASES)
     built = [problem.evaluate(decide(network, problem), seeds) for problem in problems]
     return float(np.mean([p.reward(e) for p, e in zip(problems, built, strict=True)]))
 

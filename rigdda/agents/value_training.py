@@ -40,7 +40,7 @@ SPLIT = "train"
 FEW = 6
 """Number of releases of each event to which an ensemble is reduced for a second set of features, as
 with a small budget."""
-RELEASES, LEAST, FEWEST = 72, 10, 4
+LAYOUT_RELEASES, LEAST_PER_EVENT, LEAST_PER_GROUP = 72, 10, 4
 """Releases of a layout over all events, the least number for an event, and the same for an event of
 more than `GROUP` blocks."""
 GROUP, MASS = 8, 100
@@ -48,14 +48,14 @@ GROUP, MASS = 8, 100
 RANDOM, SINGLES, PAIRS = 18, 7, 20
 """Numbers of random layouts, of random and of promising single barriers of each kind, and of pairs
 of promising barriers."""
-NOISE = 0.15
+HALF_WEIGHT_ERROR = 0.15
 """Standard error of a share that halves the weight of a sample [-]."""
 HIDDEN, MEMBERS, EPOCHS, BATCH = 32, 4, 40, 128
 """Width of the two hidden layers, number of networks in the ensemble of networks, passes over the
 samples and size of a batch."""
 RATE, DECAY, JITTER = 3e-3, 0.03, 0.05
 """Learning rate, weight decay, and standard deviation of the noise added to scaled features."""
-FILES = ("value.json", "value.safetensors")
+VALUE_FILES = ("value.json", "value.safetensors")
 """Files that a training writes besides those of the sites."""
 
 
@@ -167,7 +167,9 @@ def collect(problem: DesignProblem, rng: np.random.Generator) -> Samples:
     known = np.isfinite(shares)
     part = np.array([problem.nothing.by_event[name] for name in site.event_names])
     part = np.maximum(part / max(part.sum(), 1e-300), 0.05)
-    weight = (part * NOISE**2 / (NOISE**2 + variances))[known] / max(known.sum(), 1)
+    weight = (part * HALF_WEIGHT_ERROR**2 / (HALF_WEIGHT_ERROR**2 + variances))[known] / max(
+        known.sum(), 1
+    )
     sets = []
     for crossings in (whole, first_releases(whole, FEW)):
         forecast = Forecast(problem, crossings)
@@ -220,8 +222,8 @@ def outcomes(
     """
     site, usual = problem.site, problem.nothing.by_event
     counts = {
-        name: max(count, LEAST if sizes[name] <= GROUP else FEWEST)
-        for name, count in problem.allocation(RELEASES).items()
+        name: max(count, LEAST_PER_EVENT if sizes[name] <= GROUP else LEAST_PER_GROUP)
+        for name, count in problem.allocation(LAYOUT_RELEASES).items()
         if sizes[name] < MASS and usual[name] > 0.0
     }
     seeds = {name: release_seeds("search", 0, count) for name, count in counts.items()}

@@ -23,7 +23,7 @@ from rigdda.envs.outcome_cache import unpack
 from rigdda.envs.problem import Targets
 from rigdda.files import atomic, is_file
 
-FILE = "outcomes.msgpack.gz"
+ARCHIVE_FILE = "outcomes.msgpack.gz"
 """Name of the archive in the folder of a design."""
 
 
@@ -169,15 +169,15 @@ def read(folder: Path) -> Archive:
     BadInput
         If there is none, or it is damaged or was written by another version.
     """
-    path = folder / FILE
+    path = folder / ARCHIVE_FILE
     if not is_file(path):
-        mend = f"name the folder of a completed `rigdda design`, which contains {FILE}"
-        raise BadInput("RESULTS", str(folder), mend)
+        hint = f"name the folder of a completed `rigdda design`, which contains {ARCHIVE_FILE}"
+        raise BadInput("RESULTS", str(folder), hint)
     try:
         return msgspec.msgpack.decode(gzip.decompress(path.read_bytes()), type=Archive)
     except (OSError, EOFError, ValueError, zlib.error, msgspec.MsgspecError) as error:
-        mend = f"run `rigdda design` again: this file is damaged or of another version ({error})"
-        raise BadInput("RESULTS", str(path), " ".join(mend.split())) from None
+        hint = f"run `rigdda design` again: this file is damaged or of another version ({error})"
+        raise BadInput("RESULTS", str(path), " ".join(hint.split())) from None
 
 
 def layout_of(tables: Sequence[dict[str, Any]]) -> Layout:

@@ -29,7 +29,7 @@ APPLICATIONS = (
 )
 """Where they are on macOS, where they are not on the search path."""
 
-PATIENCE = 120.0
+LONGEST_PRINTING = 120.0
 """Longest time that a browser may take to print [s]."""
 
 
@@ -47,11 +47,11 @@ def find() -> str:
     for name in APPLICATIONS:
         if Path(name).is_file():
             return name
-    mend = (
+    hint = (
         "no browser was found that can print: install Chromium, Chrome or Edge, or open "
         "report.html and print it from there"
     )
-    raise BadInput("--pdf", True, mend)
+    raise BadInput("--pdf", True, hint)
 
 
 def arguments(folder: str) -> list[str]:
@@ -80,7 +80,9 @@ def print_pdf(program: str, page: Path) -> Path:
         command = [program, *arguments(folder), "--no-pdf-header-footer",
                    f"--print-to-pdf={made}", copy.resolve().as_uri()]  # fmt: skip
         try:
-            done = subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)
+            done = subprocess.run(
+                command, capture_output=True, timeout=LONGEST_PRINTING, check=False
+            )
         except (OSError, subprocess.TimeoutExpired) as error:
             raise Error(f"{program} could not print {page}: {error}") from None
         if not made.is_file() or made.stat().st_size == 0:

@@ -26,7 +26,7 @@ from rigdda import MECHANICS, BadInput, Layout, Outcome, __version__, check, dis
 from rigdda.agents.designers.constant import CONSTANTS, place
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds
-from rigdda.agents.limits import RELEASES, SEED
+from rigdda.agents.limits import JOB_RELEASES, SEED
 from rigdda.agents.policy import features
 from rigdda.agents.run_record import check_terms
 from rigdda.barriers import to_tables
@@ -111,8 +111,8 @@ class Recipe:
 
     def __post_init__(self) -> None:
         check.one_of("split", self.split, ("train", "validation", "test"))
-        check.integer("layouts", self.layouts, 1, RELEASES)
-        check.integer("releases", self.releases, 1, RELEASES)
+        check.integer("layouts", self.layouts, 1, JOB_RELEASES)
+        check.integer("releases", self.releases, 1, JOB_RELEASES)
         check.integer("seed", self.seed, 0, SEED)
         check.integer("max_barriers", self.max_barriers, 1)
 
@@ -175,9 +175,9 @@ def _read(file: Path) -> pa.Table:
     try:
         return parquet.read_table(file)
     except (OSError, pa.ArrowException) as error:
-        mend = "this part is missing or damaged: remove the files of this site from outcomes/ and "
-        mend += f"sites/, and repeat the command that wrote the data set ({str(error)[:80]})"
-        raise BadInput("data set", str(file), mend) from None
+        hint = "this part is missing or damaged: remove the files of this site from outcomes/ and "
+        hint += f"sites/, and repeat the command that wrote the data set ({str(error)[:80]})"
+        raise BadInput("data set", str(file), hint) from None
 
 
 def _files(folder: Path, name: str) -> tuple[Path, Path]:
@@ -193,8 +193,8 @@ def _check_folder(recipe: Recipe, folder: Path) -> None:
         try:
             found = msgspec.json.decode(file.read_bytes(), type=dict[str, Any])
         except msgspec.MsgspecError as error:
-            mend = f"this is damaged: remove the data set, or name another folder ({error})"
-            raise BadInput("data set", str(file), mend) from None
+            hint = f"this is damaged: remove the data set, or name another folder ({error})"
+            raise BadInput("data set", str(file), hint) from None
         check_terms(content, found, f"the data set in {folder}")
     with atomic(file) as fresh:
         fresh.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
@@ -241,7 +241,7 @@ def layouts(problem: DesignProblem, count: int, seed: int) -> list[tuple[str, La
         if barrier.kind in problem.kinds and len(found) < count:
             found.setdefault(place(menu, barrier, share), "constant")
     drawn = _drawn(problem, menu, rng, found)
-    for _ in range(TRIES * count):
+    for _ in range(DRAWS_PER_LAYOUT * count):
         if len(found) >= count:
             break
         origin, layout = next(drawn)
@@ -249,7 +249,7 @@ def layouts(problem: DesignProblem, count: int, seed: int) -> list[tuple[str, La
     return [(origin, layout) for layout, origin in found.items()]
 
 
-TRIES = 20
+DRAWS_PER_LAYOUT = 20
 """Number of draws per layout after which a site has no room for further layouts."""
 
 

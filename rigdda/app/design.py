@@ -13,7 +13,7 @@ from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import (
-    CHOICE,
+    CHOICE_STREAM,
     DesignResult,
     Entry,
     Progress,
@@ -105,7 +105,7 @@ def design(
 
         def check(layout: Layout, stage: str) -> Evaluation:
             if stage == "frontier":
-                evaluation = verify(free, layout, releases, seed, store, CHOICE)
+                evaluation = verify(free, layout, releases, seed, store, CHOICE_STREAM)
             else:
                 evaluation = verification.evaluate(layout, len(verification.stages) - 1)
             file.add(Entry(result.simulations, stage, evaluation))
@@ -129,7 +129,7 @@ def design(
             result, front, replaced = with_frontier(problem, result, cases, check, searched)
     tick(done, "analysing the remaining risk, checking barriers")
     named = [(case.name, case.evaluation.layout) for case in cases]
-    archive.write(out / archive.FILE, archive.archive(problem, seed, named, store))
+    archive.write(out / archive.ARCHIVE_FILE, archive.archive(problem, seed, named, store))
     found = _concluded(problem, cases, result, rule, verification, seed)
     return replace(found, frontier=front, replaced=replaced), store
 

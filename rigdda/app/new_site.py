@@ -34,7 +34,7 @@ from rigdda.model.site_tables import (
     SiteTables,
     Slope,
 )
-from rigdda.model.soundness import BEYOND
+from rigdda.model.soundness import LEAST_BEYOND
 from rigdda.model.source import Source
 from rigdda.model.survey import Profile, profile_of, read_survey
 from rigdda.model.traffic import Traffic
@@ -45,19 +45,19 @@ Span = tuple[float, float]
 SURVEYED = "surveyed"
 GIVEN = "given"
 PLACEHOLDER = "placeholder: replace"
-DEFAULT = "default: check"
+CHECK_DEFAULT = "default: check"
 """How sure a value is, as its comment says."""
 
-STEEP, FACE = 25.0, 40.0
+SLOPE_DEG, FACE_DEG = 25.0, 40.0
 """Inclination of the ground above which it is slope rather than its foot, and a face [deg]."""
 
-VERGE, LANES = 2.0, 7.0
+VERGE_WIDTH, LANES_WIDTH = 2.0, 7.0
 """Distance of a road from the toe, and its width, where it is not given [m]."""
 
 UPHILL = 15.0
 """Length of the barrier zone uphill of the toe, where it is not given [m]."""
 
-CLEARANCE = 0.5
+ZONE_CLEARANCE = 0.5
 """Distance of the barrier zone from the road, and from loose rock, where it is not given [m]."""
 
 SHORTEST = 0.5
@@ -72,13 +72,13 @@ PERIOD, MASS_PERIOD = 5.0, 50.0
 JOINTS = ((70.0, 1.0), (-20.0, 1.0))
 """Placeholders of the dip [deg] and the spacing [m] of the joints of a mass."""
 
-TRAFFIC = (2000.0, 60.0, 100.0)
+PLACEHOLDER_TRAFFIC = (2000.0, 60.0, 100.0)
 """Placeholders of the vehicles per day, their speed [km/h] and the length of the road [m]."""
 
 FOREST = (400.0, 0.3, 0.1)
 """Placeholders of the stems on a hectare, their diameter and its standard deviation [m]."""
 
-FENCE, FENCE_ROOM, REMOVAL = (250, 2.0), 3.0, 100.0
+PLACEHOLDER_FENCE, PLACEHOLDER_FENCE_ROOM, PLACEHOLDER_REMOVAL = (250, 2.0), 3.0, 100.0
 """Placeholders of a fence that stands already: class [kJ] and height [m], distance from the lower
 end of the zone [m], which leaves room for its elongation, and cost of its removal [EUR/m]."""
 
@@ -88,13 +88,13 @@ TEMPLATE = '# To use this table, remove the first "# " of each of its lines.'
 BLOCK = 0.8
 """Edge of the placeholder of a block on ground that overhangs [m]."""
 
-CLEAR = 0.01
+BLOCK_GAP = 0.01
 """Height of this block above the ground [m]: it shall not reach into it by rounding."""
 
-SPEED = 3.0
+PROFILE_SPEED = 3.0
 """Mean speed along the whole profile for which the simulated time is enough [m/s]."""
 
-MASS = re.compile(r"(.+):\s*([+-]?[\d.]+)")
+MASS_OPTION = re.compile(r"(.+):\s*([+-]?[\d.]+)")
 """NAME:START-END:DIP of an option."""
 
 RANGE = re.compile(r"(.+?):\s*([+-]?[\d.]+)\s*(?:-|to|\.\.)\s*([+-]?[\d.]+)")
@@ -183,8 +183,8 @@ def write(path: Path, text: str) -> None:
         If there is a file of that name, which may have been edited.
     """
     if path.exists():
-        mend = "name another file, or remove this one: a file that may be edited is not replaced"
-        raise BadInput("--out", str(path), mend)
+        hint = "name another file, or remove this one: a file that may be edited is not replaced"
+        raise BadInput("--out", str(path), hint)
     with atomic(path) as part:
         part.write_text(text, encoding="utf-8")
 
@@ -225,8 +225,8 @@ class _Draft:
         self.masses = [self._mass(text) for text in request.masses]
         for one, other in pairwise(sorted(self.masses, key=lambda mass: mass.span)):
             if other.span[0] < one.span[1]:
-                mend = f"let it begin where {one.name} ends"
-                raise BadInput("--mass", other.name, mend)
+                hint = f"let it begin where {one.name} ends"
+                raise BadInput("--mass", other.name, hint)
         self.sources = self._sources()
         self.zone = self._zone()
         self.named: set[str] = set()
@@ -250,7 +250,7 @@ class _Draft:
         edges = dict(zip(("start", "end"), ((at, road) for at in self.road), strict=True))
         ends = dict(zip(("start", "end"), ((at, zone) for at in self.zone), strict=True))
         limits = {
-            field.name: (field.default, DEFAULT)
+            field.name: (field.default, CHECK_DEFAULT)
             for field in described(BarrierZone)
             if not field.needed
         }
@@ -273,8 +273,8 @@ class _Draft:
                 "[motion]",
                 Motion,
                 {
-                    "duration": (self._duration(), DEFAULT),
-                    "dt": (Motion().dt, DEFAULT),
+                    "duration": (self._duration(), CHECK_DEFAULT),
+                    "dt": (Motion().dt, CHECK_DEFAULT),
                 },
             ),
             _traffic(),
@@ -292,10 +292,10 @@ class _Draft:
             at, origin = self.profile.origin.x_of(self.request.toe), self.profile.origin
             if not self.x[0] <= at <= most:
                 ends = sorted(map(origin.chainage_of, (float(self.x[0]), most)))
-                mend = f"give a chainage on the slope, {ends[0]:.10g} to {ends[1]:.10g}"
-                raise BadInput("--toe", self.request.toe, mend)
+                hint = f"give a chainage on the slope, {ends[0]:.10g} to {ends[1]:.10g}"
+                raise BadInput("--toe", self.request.toe, hint)
             return round(at, 3)
-        steep = (self._inclinations() >= STEEP) & (self.x[:-1] < most)
+        steep = (self._inclinations() >= SLOPE_DEG) & (self.x[:-1] < most)
         if not steep.any():
             return round(float(max(self.x[0], min(most, self.x[-1]))), 3)
         return round(float(min(self.x[1:][steep][-1], most)), 3)
@@ -312,8 +312,8 @@ class _Draft:
             ends, edge = (ends[0], min(map(origin.x_of, road))), "the uphill edge of the road"
         if not ends[0] <= low < high <= ends[1]:
             first, last = map(origin.chainage_of, ends)
-            mend = f"let it lie between the crest at {first:.10g} and {edge} at {last:.10g}"
-            raise BadInput("--zone", list(self.request.zone), mend)
+            hint = f"let it lie between the crest at {first:.10g} and {edge} at {last:.10g}"
+            raise BadInput("--zone", list(self.request.zone), hint)
         return round(low, 3), round(high, 3)
 
     def _road(self) -> Span:
@@ -325,19 +325,19 @@ class _Draft:
         if self.request.road is not None:
             low, high = sorted(map(origin.x_of, self.request.road))
         else:
-            low = max(self._toe(end) + VERGE, self.asked[1] if self.asked else -np.inf)
-            high = low + LANES
-        need = high + BEYOND
+            low = max(self._toe(end) + VERGE_WIDTH, self.asked[1] if self.asked else -np.inf)
+            high = low + LANES_WIDTH
+        need = high + LEAST_BEYOND
         if end < need:
             run, drop = self.x[-1] - self.x[-2], self.y[-2] - self.y[-1]
             level = float(self.y[-1] - (need - end) * (drop / run if run > 0.0 else 0.0))
             at = f"{origin.chainage_of(need):.10g}, {level + origin.elevation:.6g}"
             whose = "the road" if self.request.road else "the placeholder of the road (see --road)"
-            mend = (
-                f"survey the ground to {BEYOND:g} m beyond {whose}, or add the point {at} if it "
-                "goes on as its last piece does"
+            hint = (
+                f"survey the ground to {LEAST_BEYOND:g} m beyond {whose}, or add the point {at} if "
+                "it goes on as its last piece does"
             )
-            raise BadInput("--profile", f"ends at chainage {origin.chainage_of(end):.10g}", mend)
+            raise BadInput("--profile", f"ends at chainage {origin.chainage_of(end):.10g}", hint)
         return round(low, 3), round(high, 3)
 
     def _sources(self) -> list[tuple[str, Span, str]]:
@@ -346,19 +346,19 @@ class _Draft:
         for text in self.request.sources:
             name, span = _ranged("--source", text, origin)
             if span is None:
-                mend = 'give NAME:START-END with chainages, such as "cliff:2-8"'
-                raise BadInput("--source", text, mend)
+                hint = 'give NAME:START-END with chainages, such as "cliff:2-8"'
+                raise BadInput("--source", text, hint)
             if not self.x[0] <= span[0] < span[1] < self.road[0]:
                 low, high = sorted(map(origin.chainage_of, (float(self.x[0]), self.road[0])))
-                mend = f"put it uphill of the road, between chainage {low:.10g} and {high:.10g}"
-                raise BadInput("--source", text, mend)
+                hint = f"put it uphill of the road, between chainage {low:.10g} and {high:.10g}"
+                raise BadInput("--source", text, hint)
             found.append((name, span, GIVEN))
         return found if found or self.masses else [("face", self._face(), PLACEHOLDER)]
 
     def _mass(self, text: str) -> Mass:
         """Return the mass that an option names."""
-        found, mend = (
-            MASS.fullmatch(text.strip()),
+        found, hint = (
+            MASS_OPTION.fullmatch(text.strip()),
             'give NAME:START-END:DIP, such as "pillar:8-15:40"',
         )
         try:
@@ -367,12 +367,12 @@ class _Draft:
         except ValueError:
             span = None
         if span is None:
-            raise BadInput("--mass", text, mend)
+            raise BadInput("--mass", text, hint)
         low, high = span
         if not self.x[0] <= low < high < self.road[0]:
             ends = sorted(map(self.profile.origin.chainage_of, (float(self.x[0]), self.road[0])))
-            mend = f"put it uphill of the road, between chainage {ends[0]:.10g} and {ends[1]:.10g}"
-            raise BadInput("--mass", text, mend)
+            hint = f"put it uphill of the road, between chainage {ends[0]:.10g} and {ends[1]:.10g}"
+            raise BadInput("--mass", text, hint)
         if self.overhangs:
             raise BadInput("--mass", text, "the profile overhangs: give the polygon in the file")
         inside = (self.x > low) & (self.x < high)
@@ -381,14 +381,14 @@ class _Draft:
         foot = round(bottom + (high - low) * float(np.tan(np.radians(dip))), 3)
         if not 0.0 <= dip < 90.0 or not foot < top:
             fall = np.degrees(np.arctan2(top - bottom, high - low))
-            mend = f"give a plane that dips by 0 to less than the {fall:.0f} deg of the face"
-            raise BadInput("--mass", text, mend)
+            hint = f"give a plane that dips by 0 to less than the {fall:.0f} deg of the face"
+            raise BadInput("--mass", text, hint)
         polygon = [*face, [low, foot]]
         try:
             convex_polygon("--mass", polygon)
         except BadInput:
-            mend = "its face is hollow: name a part of it, or give the polygon in the file"
-            raise BadInput("--mass", text, mend) from None
+            hint = "its face is hollow: name a part of it, or give the polygon in the file"
+            raise BadInput("--mass", text, hint) from None
         return Mass(name, span, foot, polygon)
 
     def _bedrock(self) -> Floats:
@@ -413,16 +413,16 @@ class _Draft:
         """
         reach = _reach()
         angle = np.where(self.x[:-1] < self.toe, self._inclinations(), -90.0)
-        steep = np.flatnonzero(angle >= min(FACE, angle.max()))
+        steep = np.flatnonzero(angle >= min(FACE_DEG, angle.max()))
         low = max(float(self.x[:-1][steep].min()), float(self.x[0]) + reach)
         high = low + max((self.toe - low) / 3.0, SHORTEST)
         most = self.road[0] - 2.0 * reach
         if not low < most:
-            mend = "give where loose rock lies by --source NAME:START-END, clear of the road"
-            raise BadInput("--source", None, mend)
+            hint = "give where loose rock lies by --source NAME:START-END, clear of the road"
+            raise BadInput("--source", None, hint)
         high = min(high, most)
         if self.asked is not None:
-            clear = reach + CLEARANCE
+            clear = reach + ZONE_CLEARANCE
             above, below = (low, self.asked[0] - clear), (self.asked[1] + clear, high)
             spans = ((max(a, low), min(b, high)) for a, b in (above, below))
             low, high = next((span for span in spans if span[1] - span[0] >= SHORTEST), (low, high))
@@ -440,16 +440,23 @@ class _Draft:
             values: dict[str, tuple[Any, str]] = {
                 "name": (name, sure),
                 **(place or {"band": (list(span), sure)}),
-                "density": (usual.density, DEFAULT),
-                "surface": (usual.surface, DEFAULT),
+                "density": (usual.density, CHECK_DEFAULT),
+                "surface": (usual.surface, CHECK_DEFAULT),
             }
             if not place:
                 for key in ("corners", "aspect", "spin", "speed"):
                     value = getattr(usual, key)
-                    values[key] = (list(value) if isinstance(value, tuple) else value, DEFAULT)
+                    values[key] = (
+                        list(value) if isinstance(value, tuple) else value,
+                        CHECK_DEFAULT,
+                    )
             sources.append(Part("[[sources]]", Source, values))
             size = {} if place else {"volume": (list(VOLUME), PLACEHOLDER)}
-            law = {} if place else {"exponent": (0.6, DEFAULT), "number": ([1, 1], DEFAULT)}
+            law = (
+                {}
+                if place
+                else {"exponent": (0.6, CHECK_DEFAULT), "number": ([1, 1], CHECK_DEFAULT)}
+            )
             often = {
                 "name": (f"block, {name}", PLACEHOLDER),
                 "source": (name, sure),
@@ -472,13 +479,13 @@ class _Draft:
         """Return where barriers may stand."""
         if self.asked is not None:
             return self.asked
-        high = self.road[0] - CLEARANCE
-        free = [span[1] + _reach() + CLEARANCE for _, span, _ in self.sources]
-        free += [mass.span[1] + CLEARANCE for mass in self.masses]
+        high = self.road[0] - ZONE_CLEARANCE
+        free = [span[1] + _reach() + ZONE_CLEARANCE for _, span, _ in self.sources]
+        free += [mass.span[1] + ZONE_CLEARANCE for mass in self.masses]
         low = max(self.toe - UPHILL, *free, float(self.x[0]))
         if not low < high:
-            mend = f"give the zone for barriers: loose rock reaches x = {low:g}, close to the road"
-            raise BadInput("--zone", None, mend)
+            hint = f"give the zone for barriers: loose rock reaches x = {low:g}, close to the road"
+            raise BadInput("--zone", None, hint)
         return round(low, 3), round(high, 3)
 
     def _existing(self) -> Part:
@@ -489,17 +496,17 @@ class _Draft:
             start = max(start, high + reach)
         free.append((start, self.zone[1]))
         clear = [(a, min(b, self.zone[1])) for a, b in free]
-        low, high = ([(a, b) for a, b in clear if b - a > CLEARANCE] or [self.zone])[-1]
-        low = max(low, min(self.zone[0], high - CLEARANCE))
-        at = round(max(high - FENCE_ROOM, 0.5 * (low + high)), 3)
+        low, high = ([(a, b) for a, b in clear if b - a > ZONE_CLEARANCE] or [self.zone])[-1]
+        low = max(low, min(self.zone[0], high - ZONE_CLEARANCE))
+        at = round(max(high - PLACEHOLDER_FENCE_ROOM, 0.5 * (low + high)), 3)
         values = {
             "kind": ("fence", PLACEHOLDER),
             "x": (at, PLACEHOLDER),
-            "height": (FENCE[1], PLACEHOLDER),
-            "energy_class": (FENCE[0], PLACEHOLDER),
-            "condition": (Existing("fence", 0.0).condition, DEFAULT),
+            "height": (PLACEHOLDER_FENCE[1], PLACEHOLDER),
+            "energy_class": (PLACEHOLDER_FENCE[0], PLACEHOLDER),
+            "condition": (Existing("fence", 0.0).condition, CHECK_DEFAULT),
             "removable": (True, PLACEHOLDER),
-            "removal": (REMOVAL, PLACEHOLDER),
+            "removal": (PLACEHOLDER_REMOVAL, PLACEHOLDER),
         }
         return Part("[[existing]]", Existing, values, template=True)
 
@@ -510,7 +517,7 @@ class _Draft:
         edges = dict(zip(("start", "end"), ((at, PLACEHOLDER) for at in ends), strict=True))
         usual = Forest(*ends, *FOREST)
         values = {name: (getattr(usual, name), PLACEHOLDER) for name in ("stems", "dbh", "dbh_sd")}
-        kept = {name: (getattr(usual, name), DEFAULT) for name in ("conifers", "height")}
+        kept = {name: (getattr(usual, name), CHECK_DEFAULT) for name in ("conifers", "height")}
         return Part("[[forest]]", Forest, edges | values | kept, template=True)
 
     def _grounds(self) -> tuple[str, list[dict[str, Any]], dict[str, str]]:
@@ -573,16 +580,18 @@ class _Draft:
     def _duration(self) -> float:
         """Return how long a release is simulated [s], in steps of 5 s."""
         length = float(np.hypot(np.diff(self.x), np.diff(self.y)).sum())
-        return min(max(25.0, 5.0 * np.ceil(length / SPEED / 5.0)), 300.0)
+        return min(max(25.0, 5.0 * np.ceil(length / PROFILE_SPEED / 5.0)), 300.0)
 
 
 def _traffic() -> Part:
     """Return the template of the traffic, without which the risk to life is not computed."""
-    usual = Traffic(*TRAFFIC)
-    given = dict(zip(("vehicles_per_day", "speed", "section_length"), TRAFFIC, strict=True))
+    usual = Traffic(*PLACEHOLDER_TRAFFIC)
+    given = dict(
+        zip(("vehicles_per_day", "speed", "section_length"), PLACEHOLDER_TRAFFIC, strict=True)
+    )
     kept = ("vehicle_length", "occupancy", "vulnerability_run_into", "commuter_trips")
     values = {name: (value, PLACEHOLDER) for name, value in given.items()}
-    values |= {name: (getattr(usual, name), DEFAULT) for name in kept}
+    values |= {name: (getattr(usual, name), CHECK_DEFAULT) for name in kept}
     return Part("[traffic]", Traffic, values, template=True)
 
 
@@ -593,8 +602,8 @@ def _mass_tables(mass: Mass) -> tuple[Part, Part]:
         "name": (mass.name, GIVEN),
         "polygon": (mass.polygon, GIVEN),
         "joints": (joints, PLACEHOLDER),
-        "density": (Source(band=(1.0, 2.0)).density, DEFAULT),
-        "surface": (Source(band=(1.0, 2.0)).surface, DEFAULT),
+        "density": (Source(band=(1.0, 2.0)).density, CHECK_DEFAULT),
+        "surface": (Source(band=(1.0, 2.0)).surface, CHECK_DEFAULT),
     }
     event: dict[str, tuple[Any, str]] = {
         "name": (f"mass, {mass.name}", PLACEHOLDER),
@@ -627,7 +636,7 @@ def _block(points: Floats, span: Span) -> list[list[float]]:
     ground, low = Terrain(points), round(0.5 * sum(span), 3)
     high = round(low + BLOCK, 3)
     inner = [x for x in points[:, 0] if low < x < high]
-    bottom = round(max(map(ground.height, [low, *inner, high])) + CLEAR, 3)
+    bottom = round(max(map(ground.height, [low, *inner, high])) + BLOCK_GAP, 3)
     top = round(bottom + BLOCK, 3)
     return [[low, bottom], [high, bottom], [high, top], [low, top]]
 
@@ -638,14 +647,14 @@ def _ranged(option: str, text: str, origin: Origin) -> tuple[str, Span | None]:
     if found is None:
         name = text.strip()
         if not name or ":" in name:
-            mend = 'give NAME:START-END with chainages, such as "talus:12-30"'
-            raise BadInput(option, text, mend)
+            hint = 'give NAME:START-END with chainages, such as "talus:12-30"'
+            raise BadInput(option, text, hint)
         return name, None
     try:
         span = float(found[2]), float(found[3])
     except ValueError:
-        mend = 'give NAME:START-END with chainages, such as "talus:12-30"'
-        raise BadInput(option, text, mend) from None
+        hint = 'give NAME:START-END with chainages, such as "talus:12-30"'
+        raise BadInput(option, text, hint) from None
     low, high = sorted(map(origin.x_of, _sorted(option, span)))
     return found[1].strip(), (round(low, 6), round(high, 6))
 
@@ -657,8 +666,8 @@ def _library(word: str) -> tuple[str, str]:
     if ground not in GROUNDS:
         near = [name for name in GROUNDS if asked in name]
         if len(near) != 1:
-            mend = f"name one of the grounds {', '.join(near or GROUNDS)}"
-            raise BadInput("--ground", word, mend)
+            hint = f"name one of the grounds {', '.join(near or GROUNDS)}"
+            raise BadInput("--ground", word, hint)
         ground = near[0]
     surface = {ground: name for name, ground in USUAL.items()}.get(ground, asked)
     return surface, ground
@@ -669,8 +678,8 @@ def _check_apart(given: Iterable[tuple[Span, str]], origin: Origin) -> None:
     for (one, name), (two, other) in pairwise(sorted(given)):
         if two[0] < one[1]:
             start = origin.chainage_of(two[0])
-            mend = f"let it begin where {name} ends, at chainage {origin.chainage_of(one[1]):g}"
-            raise BadInput("--ground", f"{other} from chainage {start:g}", mend)
+            hint = f"let it begin where {name} ends, at chainage {origin.chainage_of(one[1]):g}"
+            raise BadInput("--ground", f"{other} from chainage {start:g}", hint)
 
 
 def _head(name: str, file: Path, profile: Profile) -> list[str]:
@@ -679,7 +688,7 @@ def _head(name: str, file: Path, profile: Profile) -> list[str]:
         f"Site {name}: the profile is that of {file.name}, all else is what a comment says of it.",
         f'"{SURVEYED}" and "{GIVEN}": from the survey, and from who made this file.',
         f'"{PLACEHOLDER}": a guess that only makes the file complete.',
-        f'"{DEFAULT}": a usual value, or an order of magnitude.',
+        f'"{CHECK_DEFAULT}": a usual value, or an order of magnitude.',
         "x is the chainage in metres and grows downhill; y is the elevation in metres.",
         *(f"Import: {note}." for note in profile.notes),
         "`rigdda check FILE` draws this site and says what looks odd. All keys: docs/site.md.",
@@ -688,7 +697,9 @@ def _head(name: str, file: Path, profile: Profile) -> list[str]:
 
 def _defaults(head: str, table: type[msgspec.Struct]) -> Part:
     """Return a table with the defaults of all its fields."""
-    return Part(head, table, {field.name: (field.default, DEFAULT) for field in described(table)})
+    return Part(
+        head, table, {field.name: (field.default, CHECK_DEFAULT) for field in described(table)}
+    )
 
 
 def _render(head: Sequence[str], parts: Iterable[Part]) -> str:

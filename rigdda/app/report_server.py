@@ -42,7 +42,7 @@ HOST = "127.0.0.1"
 LEAD = 0.5
 """Time before the first impact at which the replay begins [s]."""
 
-PATIENCE = 30.0
+LONGEST_START = 30.0
 """Longest time that the viewer may take to start [s]."""
 
 PAGES_POLICY = "default-src 'self'; style-src 'unsafe-inline'; img-src data:"
@@ -245,7 +245,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _pass_on(self, address: str) -> None:
         """Answer with what the viewer's own server answers, without links to other machines."""
         try:
-            with urllib.request.urlopen(address, timeout=PATIENCE) as found:
+            with urllib.request.urlopen(address, timeout=LONGEST_START) as found:
                 kind, data = found.headers.get("Content-Type", ""), found.read()
         except urllib.error.HTTPError as error:
             self.send_error(error.code)
@@ -294,7 +294,7 @@ def _viewer(url: str) -> Iterator[str]:
 
 def _wait(process: subprocess.Popen[bytes], port: int) -> None:
     """Wait until a server listens at a port."""
-    latest = time.monotonic() + PATIENCE
+    latest = time.monotonic() + LONGEST_START
     while process.poll() is None and time.monotonic() < latest:
         with contextlib.suppress(OSError), socket.create_connection((HOST, port), 1.0):
             return

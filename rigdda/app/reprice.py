@@ -24,7 +24,7 @@ import numpy as np
 
 from rigdda import BadInput, Layout, Outcome, Site, fields
 from rigdda.agents.designers.frontier import TriedLayout, frontier, worst
-from rigdda.agents.designers.protocol import CHOICE, STREAMS, End, of_chance, of_mean
+from rigdda.agents.designers.protocol import CHOICE_STREAM, STREAMS, End, of_chance, of_mean
 from rigdda.app import archive
 from rigdda.app.archive import Archive
 from rigdda.app.design_study import ComparedLayouts, VerifiedLayout
@@ -35,7 +35,7 @@ from rigdda.envs.intervals import Estimate, Mean, estimate
 from rigdda.envs.outcome_cache import NO_EVENT_MOTION, NO_MOTION
 from rigdda.envs.problem import MISSED, Targets, excess, read_targets
 
-BEST = "best of search"
+BEST_OF_SEARCH = "best of search"
 """Name of the layout that is best for the new values."""
 
 Value = bool | int | float | str | Mapping[str, Any]
@@ -76,8 +76,8 @@ def parse(text: str) -> tuple[str, Value]:
     try:
         found = msgspec.toml.decode(f"value = {value.strip()}")
     except msgspec.DecodeError:
-        mend = "write a number, true, false or a text in quotation marks after the ="
-        raise BadInput("--set", text, mend) from None
+        hint = "write a number, true, false or a text in quotation marks after the ="
+        raise BadInput("--set", text, hint) from None
     return path, found["value"]
 
 
@@ -135,11 +135,11 @@ def _table_of(site: Site, path: str, value: Value) -> tuple[str, list[str]]:
     names = type(site).__struct_fields__
     if top not in names:
         near = difflib.get_close_matches(top, names, 1)
-        mend = f"did you mean {near[0]}?" if near else "give a key such as consequences.closure"
-        raise BadInput(path, value, f"there is no such key: {mend}")
+        hint = f"did you mean {near[0]}?" if near else "give a key such as consequences.closure"
+        raise BadInput(path, value, f"there is no such key: {hint}")
     if top == "barrier_zone":
-        mend = "a search in another zone tries other layouts: run `rigdda design` for this"
-        raise BadInput(path, value, mend)
+        hint = "a search in another zone tries other layouts: run `rigdda design` for this"
+        raise BadInput(path, value, hint)
     if top in MOTION:
         raise _needs_simulation(path, value)
     if top in LABELS:
@@ -147,14 +147,14 @@ def _table_of(site: Site, path: str, value: Value) -> tuple[str, list[str]]:
     if not keys:
         raise BadInput(path, value, f"add a key of the table, such as {top}.KEY=VALUE")
     if getattr(site, top) is None:
-        mend = f"add the table [{top}] to the site file and run `rigdda design`"
-        raise BadInput(path, value, mend)
+        hint = f"add the table [{top}] to the site file and run `rigdda design`"
+        raise BadInput(path, value, hint)
     return top, keys
 
 
 def _needs_simulation(path: str, value: Value) -> BadInput:
-    mend = "releases depend on it: change it in the site file and run `rigdda design`"
-    return BadInput(path, value, mend)
+    hint = "releases depend on it: change it in the site file and run `rigdda design`"
+    return BadInput(path, value, hint)
 
 
 def _named(site: Site, path: str, value: Value, top: str) -> tuple[int, list[str]]:
@@ -349,7 +349,7 @@ def reprice(
     for name, tables in zip(kept.names, kept.layouts, strict=True):
         layout = archive.layout_of(tables)
         cases.append(VerifiedLayout(name, judged(problem, found[layout], kept)))
-    cases.append(VerifiedLayout(BEST, evaluation))
+    cases.append(VerifiedLayout(BEST_OF_SEARCH, evaluation))
     tried = [c for c in found.values() if problem.place.too_expensive(c.layout) is None]
     front: tuple[TriedLayout, ...] = ()
     if evaluation.targets == MISSED:
@@ -395,7 +395,7 @@ def judged(problem: DesignProblem, candidate: ScoredLayout, kept: Archive) -> Ev
     )
 
 
-VERIFIED = (STREAMS.index("verification"), STREAMS.index(CHOICE))
+VERIFIED = (STREAMS.index("verification"), STREAMS.index(CHOICE_STREAM))
 """Streams of releases that no search used, the one of the table of the design first."""
 
 
@@ -416,7 +416,7 @@ def _candidates(problem: ArchivedProblem, kept: Archive) -> dict[Layout, ScoredL
     return found
 
 
-FEW = 8
+FEW_RELEASES = 8
 """Number of releases of an event to which the mean without barriers complements fewer releases."""
 
 ERRORS = 2.0
@@ -442,7 +442,7 @@ def _candidate(
         which, without = own.event == event.name, spent[event.name]
         bills, n = (own.harm + own.repair)[which], int(which.sum())
         rate = site.rate(event.name, layout)
-        more = max(FEW - n, 0)
+        more = max(FEW_RELEASES - n, 0)
         mean = (float(bills.sum()) + more * float(without.mean())) / (n + more)
         squares = float(np.square(bills - mean).sum()) + (more + 1) * float(without.var())
         value += rate * mean

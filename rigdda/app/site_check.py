@@ -28,13 +28,13 @@ from rigdda.fields import Described, described, parse
 from rigdda.files import read
 from rigdda.geometry import polygon_properties
 from rigdda.ground.grounds import GROUNDS
-from rigdda.ground.surface import PLAIN
+from rigdda.ground.surface import WITHOUT_GROUND
 from rigdda.model import site_names
 from rigdda.model.existing import Existing
 from rigdda.model.forest import most_energy
 from rigdda.model.joints import spaced_area
 from rigdda.model.site_tables import Origin
-from rigdda.model.soundness import BEYOND
+from rigdda.model.soundness import LEAST_BEYOND
 from rigdda.model.survey import spike_words, spikes
 from rigdda.releases import Batch
 
@@ -50,19 +50,19 @@ DRAWN_STEMS, WOOD = 60, "#2e7d32"
 Written = Mapping[str, Mapping[str, Any]]
 """Tables of events as they are written, by the name of the event."""
 
-DRAWS = 20
+CUTS = 20
 """Times that a jointed mass is cut to tell its blocks."""
 
 WIDE, NARROW = 20.0, 3.0
 """Widths of a road beyond which its unit is doubted [m]."""
 
-TALL, LOW = 1500.0, 2.0
+DOUBTED_HEIGHT, LOW = 1500.0, 2.0
 """Heights of a slope beyond which its unit is doubted [m]."""
 
-LIGHT, HEAVY = 1500.0, 3500.0
+LIGHT, USUAL_DENSITIES = 1500.0, 3500.0
 """Densities beyond which rock is unusual [kg/m3]."""
 
-OFTEN = 5.0
+DOUBTED_RATE = 5.0
 """Rate from which on a return period may be meant [1/year per 100 m]."""
 
 SPARSE, DENSE = 2.0, 90.0
@@ -80,7 +80,7 @@ HANGING = 0.05
 TINY = 5e-4
 """Volume of a block up to which its unit is doubted [m3]: half a litre weighs 1.3 kg."""
 
-MANY, CROWDED = 100, 1000
+SLOW_LOOSE_BLOCKS, SLOW_MASS_BLOCKS = 100, 1000
 """Numbers of loose blocks, and of blocks of a mass, from which on a release is slow."""
 
 LEAST_SHARE = 0.01
@@ -93,11 +93,11 @@ doubted whether their rates hold for all of the road."""
 TALLEST = {"wall": 6.0, "gravity_wall": 8.0, "embankment": 12.0}
 """Heights above which a barrier is unusual for its kind [m]; assumed."""
 
-LIMITS = {"height": "max_height", "depth": "max_depth", "width": "max_width",
+SIZE_LIMITS = {"height": "max_height", "depth": "max_depth", "width": "max_width",
           "thickness": "max_thickness"}  # fmt: skip
 """Limits of the zone for sizes of barriers."""
 
-FAR = 20.0
+DOUBTED_PRICE_FACTOR = 20.0
 """Factor on a usual price, either way, beyond which its unit is doubted."""
 
 NO_CHARGE = ("fence_base", "ditch_base", "removal", "clearing")
@@ -106,7 +106,7 @@ NO_CHARGE = ("fence_base", "ditch_base", "removal", "clearing")
 CLOSURES = (1e3, 5e6)
 """Costs of a day of closure beyond which its unit is doubted [EUR]."""
 
-DAYS = 20.0
+DOUBTED_CLOSURE_DAYS = 20.0
 """Days of closure for any rock, or for 1 m3, above which their unit is doubted."""
 
 SHARES = {"interest": 0.15, "upkeep": 0.1}
@@ -121,10 +121,10 @@ DEAR = 5000.0
 LAWS = ("friction_deg", "restitution", "rolling", "roughness")
 """Values of a surface for which its ground has a plausible range."""
 
-SHORT = 1.2 * BEYOND
+SHORT = 1.2 * LEAST_BEYOND
 """Length of the ground beyond the road that leaves a run-out little room [m]."""
 
-FALLING = 10.0
+FALLING_DEG = 10.0
 """Inclination of the last piece of the ground above which rock goes on beyond it [deg]."""
 
 SCALED = 1.2
@@ -139,10 +139,10 @@ CHEAP = 1e5
 LEAST_ROOM = 3.0
 """Length of the zone below which there is little to choose [m]."""
 
-FENCE = 500
+LEAST_FENCE_CLASS = 500
 """Energy class of the least fence that there should be room for [kJ]."""
 
-TRIES = 3
+TIMED_RELEASES = 3
 """Releases of each event that are timed."""
 
 LONG = 2.0
@@ -286,7 +286,7 @@ def _source(source: Source) -> str:
         return (
             f"source {source.name}: loose blocks at x = {source.band[0]:g} to {source.band[1]:g} m"
         )
-    areas = [_areas(source, seed) for seed in range(DRAWS if source.polygon else 1)]
+    areas = [_areas(source, seed) for seed in range(CUTS if source.polygon else 1)]
     counts, every = [len(found) for found in areas], np.concatenate(areas)
     shares = np.array([*np.quantile(every, [0.1, 0.5, 0.9]), every.max()])
     low, middle, high, most = map(_figures, shares)
@@ -344,7 +344,7 @@ def try_releases(site: Site, seed: int = 0) -> list[Trial]:
     batch.outcome(seed, site.event_names[0])  # compiles what is not compiled yet
     for event in site.events:
         spent, steps, cut = [], 0, False
-        for k in range(TRIES):
+        for k in range(TIMED_RELEASES):
             scene = site.realise((), seed + k, event.name)
             steps = max(steps, math.ceil(site.motion.duration / site.settings(scene).dt))
             start = time.process_time()
@@ -475,7 +475,7 @@ def _odd_profile(site: Site) -> Iterator[str]:
     road, toe = site.road, site.slope.toe
     foot, crest = site.profile.height(road.start), float(y.max())
     tall, wide = crest - foot, road.end - road.start
-    if tall > TALL or tall < LOW:
+    if tall > DOUBTED_HEIGHT or tall < LOW:
         yield (
             f"slope.points: the crest is {tall:g} m above the road; are the coordinates in metres, "
             "not in millimetres or feet?"
@@ -497,7 +497,7 @@ def _odd_profile(site: Site) -> Iterator[str]:
             "can run on there"
         )
     fall = math.degrees(math.atan2(y[-2] - y[-1], abs(x[-1] - x[-2])))
-    if fall > FALLING:
+    if fall > FALLING_DEG:
         yield (
             f"slope.points: the ground falls by {fall:.0f} deg where it ends; survey it to where "
             "rock stops if what lies below the road counts"
@@ -509,7 +509,7 @@ def _odd_surfaces(site: Site) -> Iterator[str]:
     for name, surface in site.surfaces.items():
         for law in LAWS:
             value = getattr(surface, law)
-            if value is None or (not surface.ground and value == PLAIN[law]):
+            if value is None or (not surface.ground and value == WITHOUT_GROUND[law]):
                 continue
             low, high, whose = _plausible(surface.ground, law)
             if not low <= value <= high:
@@ -543,11 +543,12 @@ def _odd_zone(site: Site) -> Iterator[str]:
             f"barrier_zone: {longest:.1f} m are free of loose rock; the best place will lie on an "
             "end of it"
         )
-    room, needed = site.road.start - rooms[0][0], FENCE_CLASSES[FENCE].elongation
+    room, needed = site.road.start - rooms[0][0], FENCE_CLASSES[LEAST_FENCE_CLASS].elongation
     if room < needed:
         yield (
-            f"barrier_zone.start = {zone.start:g}: a fence of {FENCE} kJ gives way by {needed:g} "
-            f"m, and there are {room:.1f} m up to the road; begin the zone farther uphill"
+            f"barrier_zone.start = {zone.start:g}: a fence of {LEAST_FENCE_CLASS} kJ gives way by "
+            f"{needed:g} m, and there are {room:.1f} m up to the road; begin the zone farther "
+            "uphill"
         )
     size = max(_size(site, event) for event in site.events)
     for name, factor in (("max_height", 1.5), ("max_depth", 1.0), ("max_width", 1.5)):
@@ -616,7 +617,7 @@ def _odd_existing(site: Site) -> Iterator[str]:
 def _odd_sizes(site: Site, where: str, one: Existing) -> Iterator[str]:
     """Yield the sizes of an existing barrier that are beyond the zone or unusual for its kind."""
     kind = one.kind.replace("_", " ")
-    for name, bound in LIMITS.items():
+    for name, bound in SIZE_LIMITS.items():
         value, most = getattr(one, name), getattr(site.barrier_zone, bound)
         fixed = (one.kind, name) in (("fence", "thickness"), ("embankment", "width"))
         if value is not None and value > most and not fixed:
@@ -647,7 +648,7 @@ def _odd_prices(site: Site) -> Iterator[str]:
         )
     for name in ("days_base", "days_factor"):
         days = getattr(site.consequences, name)
-        if days > DAYS:
+        if days > DOUBTED_CLOSURE_DAYS:
             yield f"consequences.{name} = {days:g} days: is it in hours?"
     shares = {"interest": site.prices.interest}
     shares |= {f"upkeep.{kind}": share for kind, share in site.prices.upkeep.items()}
@@ -672,7 +673,7 @@ def _odd_price(where: str, field: Described, value: Any, usual: Any) -> Iterator
         if price == 0.0 and field.name not in NO_CHARGE:
             yield f"{where}.{name} = 0 {field.unit}: it would cost nothing; give its price"
             return
-        if price > 0.0 and not 1.0 / FAR <= price / order <= FAR:
+        if price > 0.0 and not 1.0 / DOUBTED_PRICE_FACTOR <= price / order <= DOUBTED_PRICE_FACTOR:
             yield (
                 f"{where}.{name} = {price:g} {field.unit}: a usual value is {order:g}; is it in "
                 f"{field.unit}, and in EUR, not in thousands of EUR?"
@@ -721,7 +722,7 @@ def _size(site: Site, event: Event) -> float:
 
 def _odd_source(site: Site, source: Source) -> Iterator[str]:
     """Yield what is odd about a source."""
-    if not LIGHT <= source.density <= HEAVY:
+    if not LIGHT <= source.density <= USUAL_DENSITIES:
         yield f"{source.words}.density = {source.density:g} kg/m3: rock has 2,000 to 3,100"
     if source.band is not None:
         start, end = source.band
@@ -793,7 +794,7 @@ def _hanging(site: Site, source: Source) -> Iterator[tuple[str, float]]:
 def _odd_event(site: Site, event: Event, table: Mapping[str, Any]) -> Iterator[str]:
     """Yield what is odd about an event, whose table may be known as it is written."""
     source = site.source(event.source)
-    if event.rate >= OFTEN:
+    if event.rate >= DOUBTED_RATE:
         often = f"{event.rate:.3g} events a year on 100 m of slope"
         if "return_period" in table:
             period, length = table["return_period"], table.get("section_length")
@@ -808,13 +809,13 @@ def _odd_event(site: Site, event: Event, table: Mapping[str, Any]) -> Iterator[s
                 f"{event.rate:g} years, write return_period = {event.rate:g}"
             )
     yield from _odd_volume(event, source, table)
-    if source.band is not None and event.number[1] >= MANY:
+    if source.band is not None and event.number[1] >= SLOW_LOOSE_BLOCKS:
         low, high = event.number
         yield (
             f"{event.words}.number = [{low}, {high}]: releases of so many blocks are slow; check "
             "that the rate is that of releases, not of blocks"
         )
-    elif source.band is None and (count := event.block_count(source)) >= CROWDED:
+    elif source.band is None and (count := event.block_count(source)) >= SLOW_MASS_BLOCKS:
         yield (
             f"{event.words}: a release has about {count:,.0f} blocks and is slow; give fewer, "
             f"larger blocks of {source.words} if this is enough"
@@ -870,7 +871,7 @@ COLOURS = {
 }
 """Colour of each ground of the library in pictures."""
 
-OTHERS = ("#e0b8a0", "#c4b7d6", "#b8d4d0", "#d9d9d9")
+OTHER_COLOURS = ("#e0b8a0", "#c4b7d6", "#b8d4d0", "#d9d9d9")
 """Colours of surfaces that name no ground."""
 
 ZONED, STARTS = "#1c5aa0", "#b3261e"
@@ -914,7 +915,7 @@ def _draw_ground(axes: Axes, site: Site, bottom: float) -> None:
     """Fill the ground below each segment with the colour of its surface."""
     points, names = site.slope.chain()
     used = list(dict.fromkeys(names))
-    unknown = iter(OTHERS * len(used))
+    unknown = iter(OTHER_COLOURS * len(used))
     colours = {n: COLOURS.get(site.surfaces[n].ground) or next(unknown) for n in used}
     told: set[str] = set()
     overhangs = any(b[0] < a[0] for a, b in pairwise(points))

@@ -20,7 +20,13 @@ import rigdda
 from rigdda import MECHANICS, BadInput, Layout, Outcome, Site, check
 from rigdda.agents import limits
 from rigdda.app.reports.study_report import StudiedLayout, StudyResults
-from rigdda.app.reports.tables import HIT, OUTCOME, RUN_OUT, outcome_row, write_rows
+from rigdda.app.reports.tables import (
+    BARRIER_COLUMNS,
+    OUTCOME_COLUMNS,
+    RUN_OUT_COLUMNS,
+    outcome_row,
+    write_rows,
+)
 from rigdda.barriers import from_table
 from rigdda.envs.cost import Account, Facts, learn
 from rigdda.envs.outcome_cache import fingerprint
@@ -82,16 +88,16 @@ def load(path: str | os.PathLike[str]) -> Study:
     faults: list[BadInput] = []
     for i, table in enumerate(data.layouts):
         if table.name in layouts or not table.name:
-            mend = "give each layout a name of its own"
-            faults.append(BadInput(f"layouts[{i}].name", table.name, mend))
+            hint = "give each layout a name of its own"
+            faults.append(BadInput(f"layouts[{i}].name", table.name, hint))
             continue
         layouts[table.name], found = _layout(site, table, file.parent)
-        faults += [BadInput(f"layouts.{table.name}.{f.field}", f.value, f.mend) for f in found]
+        faults += [BadInput(f"layouts.{table.name}.{f.field}", f.value, f.hint) for f in found]
     if faults:
         raise _together(faults)
     if not layouts:
         raise BadInput("layouts", 0, "give at least one table [[layouts]]")
-    most = limits.RELEASES // len(layouts) // len(site.events)
+    most = limits.JOB_RELEASES // len(layouts) // len(site.events)
     releases = check.integer("releases", data.releases, 1, most)
     return Study(site, releases, layouts)
 
@@ -137,7 +143,7 @@ def _barriers(rows: Sequence[dict[str, Any]]) -> tuple[Layout, list[BadInput]]:
 def _together(faults: Sequence[BadInput]) -> BadInput:
     """Return one error that names all faults."""
     first, *others = faults
-    return BadInput(first.field, first.value, "; also ".join([first.mend, *map(str, others)]))
+    return BadInput(first.field, first.value, "; also ".join([first.hint, *map(str, others)]))
 
 
 Tick = Callable[[int, str], None]
@@ -148,14 +154,14 @@ CHUNK = 64
 """Number of releases that are simulated together before their rows are written."""
 
 _NUMBERS = (
-    "width", "released_volume", "reached", *OUTCOME, *RUN_OUT,
+    "width", "released_volume", "reached", *OUTCOME_COLUMNS, *RUN_OUT_COLUMNS,
 )  # fmt: skip
 """Columns with numbers of an outcome, without those of the barriers."""
 
 _MONEY = ("harm", "repair")
 """Columns with the costs of a release [EUR per occurrence of its event]."""
 
-_TOLL = ("vehicles_hit", "vehicles_run_into", "fatalities")
+_TRAFFIC_COLUMNS = ("vehicles_hit", "vehicles_run_into", "fatalities")
 """Columns with the expected consequences of a release for the traffic, if the site gives it."""
 
 
@@ -214,7 +220,11 @@ def _row(study: Study, job: Job, outcome: Outcome) -> dict[str, Any]:
     row: dict[str, Any] = {"layout": job[0], "seed": job[2]}
     row |= {"capital": study.site.capital(layout), "harm": bill.harm, "repair": bill.repair}
     if study.site.traffic is not None:
-        row |= zip(_TOLL, map(float, study.site.toll(layout, outcome)), strict=True)
+        row |= zip(
+            _TRAFFIC_COLUMNS,
+            map(float, study.site.traffic_consequences(layout, outcome)),
+            strict=True,
+        )
     return row | outcome_row(outcome)
 
 
@@ -229,14 +239,14 @@ def _key(study: Study, name: str, event: str, seed: int) -> str:
 def _fields(study: Study) -> list[str]:
     """Return the columns, with those of as many barriers as the largest layout has."""
     most = max(len(study.site.standing(layout)) for layout in study.layouts.values())
-    barriers = [f"barrier_{i}_{name}" for i in range(most) for name in HIT]
+    barriers = [f"barrier_{i}_{name}" for i in range(most) for name in BARRIER_COLUMNS]
     money = _money(study.site)
     return ["layout", "event", "seed", "capital", *money, *_NUMBERS, *barriers, "key"]
 
 
 def _money(site: Site) -> tuple[str, ...]:
-    """Return the columns with costs and, if the site gives traffic, with the toll."""
-    return _MONEY if site.traffic is None else (*_MONEY, *_TOLL)
+    """Return the columns with costs and, if the site gives traffic, with those for it."""
+    return _MONEY if site.traffic is None else (*_MONEY, *_TRAFFIC_COLUMNS)
 
 
 def _read(path: Path, fields: list[str]) -> list[dict[str, Any]]:
@@ -252,11 +262,11 @@ def _read(path: Path, fields: list[str]) -> list[dict[str, Any]]:
         return []
     head, *rows = [*_lines(text)] or [[]]
     if not {name for name in fields if not name.startswith("barrier_")} <= set(head):
-        mend = (
+        hint = (
             "this is not a study table of this version: move it away or name another folder with "
             "--out"
         )
-        raise BadInput("study table", str(path), mend)
+        raise BadInput("study table", str(path), hint)
     if not text.endswith("\n"):  # the last row is incomplete because the process was killed
         rows = rows[:-1]
     found = (dict(zip(head, row, strict=False)) for row in rows)
@@ -283,7 +293,11 @@ def _sound(row: dict[str, Any], study: Study, job: Job) -> bool:
         return False
     if _number(row["capital"]) != study.site.capital(layout):
         return False
-    mine = {f"barrier_{i}_{hit}" for i in range(len(study.site.standing(layout))) for hit in HIT}
+    mine = {
+        f"barrier_{i}_{hit}"
+        for i in range(len(study.site.standing(layout)))
+        for hit in BARRIER_COLUMNS
+    }
     said = {field for field, text in row.items() if field.startswith("barrier_") and text}
     wanted = {*mine, *_NUMBERS, *_money(study.site)}
     return said == mine and all(math.isfinite(_number(row[field])) for field in wanted)
@@ -334,7 +348,9 @@ def _account(site: Site, rows: Sequence[dict[str, str]]) -> Account:
         volume=column("road_volume"),
         reached=column("reached") > 0.0,
         failed=np.array(["True" in texts for texts in said], dtype=bool),
-        toll=None if site.traffic is None else np.column_stack([column(n) for n in _TOLL]),
+        toll=None
+        if site.traffic is None
+        else np.column_stack([column(n) for n in _TRAFFIC_COLUMNS]),
     )
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from rigdda.agents.limits import RELEASES
+from rigdda.agents.limits import JOB_RELEASES
 
 if TYPE_CHECKING:
     from rigdda import Layout, Site
@@ -127,7 +127,7 @@ executor_option = click.option(
 
 def count_option(name: str, least: int, default: int, words: str) -> Callable[..., Any]:
     """Return an option that takes a count, for example of releases."""
-    kind = WholeNumber(least, RELEASES)
+    kind = WholeNumber(least, JOB_RELEASES)
     return click.option(name, type=kind, default=default, show_default=True, help=words)
 
 
@@ -162,7 +162,7 @@ if TYPE_CHECKING:
 FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*]')
 """Characters that some operating system does not allow in the name of a folder."""
 
-LONGEST = 200
+LONGEST_FOLDER_NAME = 200
 """Greatest length of the name of a folder [bytes]; operating systems allow 255."""
 
 PAUSE = 15.0
@@ -251,12 +251,12 @@ def folder_for(out: Path | None, name: str, *files: str) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:
-        mend = f"name a folder that can be created and written into ({error.strerror})"
-        raise BadInput("--out", str(folder), mend) from None
+        hint = f"name a folder that can be created and written into ({error.strerror})"
+        raise BadInput("--out", str(folder), hint) from None
     for file in (folder / name for name in files):
         if file.exists() and not (file.is_file() and os.access(file, os.W_OK)):
-            mend = "this file cannot be overwritten: move it away or name another folder"
-            raise BadInput("--out", str(file), mend)
+            hint = "this file cannot be overwritten: move it away or name another folder"
+            raise BadInput("--out", str(file), hint)
     return folder
 
 
@@ -264,7 +264,7 @@ def _part(name: str) -> str:
     """Return a name, for example of a site, as a valid part of a path."""
     coding = sys.getfilesystemencoding()
     known = name.encode(coding, "replace").decode(coding)
-    return FORBIDDEN.sub("-", known).encode(coding)[:LONGEST].decode(coding, "ignore")
+    return FORBIDDEN.sub("-", known).encode(coding)[:LONGEST_FOLDER_NAME].decode(coding, "ignore")
 
 
 @contextmanager
@@ -360,8 +360,8 @@ def _alone(folder: Path) -> Iterator[None]:
     try:
         lock.acquire(timeout=0.0)
     except Timeout:
-        mend = "another run is writing into it: wait until it has ended or name another folder"
-        raise BadInput("--out", str(folder), mend) from None
+        hint = "another run is writing into it: wait until it has ended or name another folder"
+        raise BadInput("--out", str(folder), hint) from None
     except (OSError, NotImplementedError):  # some network drives cannot lock files
         pass
     if lock.is_locked:
@@ -377,10 +377,10 @@ def _alone(folder: Path) -> Iterator[None]:
 
 def _stamps(folder: Path) -> set[Stamp]:
     """Return the names of the files in a folder that hold results, each with its stamp."""
-    from rigdda.agents.run_record import FILE
+    from rigdda.agents.run_record import RECORD_FILE
 
     found = ((file.name, file.lstat()) for file in folder.iterdir())
-    found = ((name, s) for name, s in found if name not in (LOCK, FILE))
+    found = ((name, s) for name, s in found if name not in (LOCK, RECORD_FILE))
     return {(name, (s.st_ino, s.st_size, s.st_mtime_ns)) for name, s in found}
 
 
@@ -475,7 +475,7 @@ def warn_of_placeholders(site: str) -> None:
         note(f"the site file marks {count} values as placeholders to replace")
 
 
-TRAFFIC = (
+TRAFFIC_HEADING = (
     "risk to the traffic on {0.section_length:g} m of road, per year: vehicles hit by falling "
     "rock,\nvehicles that run into debris, deaths, deaths per km, and the individual risk\n"
     "of a person who travels it {0.commuter_trips:g} times, with the upper end of its 95 % interval"
@@ -489,5 +489,5 @@ def show_risks(done: ComparedLayouts) -> None:
 
     risks = tables.risks(done)
     if risks is not None:
-        click.echo(TRAFFIC.format(done.problem.site.traffic))
+        click.echo(TRAFFIC_HEADING.format(done.problem.site.traffic))
         show(risks)

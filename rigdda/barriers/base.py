@@ -59,16 +59,16 @@ class Reach(NamedTuple):
 MIN_HEIGHT = 0.5
 """Minimum height of a barrier, and minimum depth of a ditch, in a design [m]."""
 
-STEP = 0.5
+SIZE_STEP = 0.5
 """Increment of heights, depths and widths in a search [m]; thickness has half of it."""
 
-TOLERANCE = 1e-9
+LIMIT_ROUNDING = 1e-9
 """Rounding error that is tolerated at limits, relative to the limit or, if larger, 1 [m]."""
 
-NEAR = 0.05
+BOUND_MARGIN = 0.05
 """Distance from a bound within which a length counts as being at the bound [m]."""
 
-HEIGHTS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
+CATALOGUE_HEIGHTS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
 """Heights of barriers in the catalogue of a search [m]."""
 
 
@@ -81,7 +81,7 @@ class Length(NamedTuple):
     """Field of the zone with its greatest value."""
     least: str | None = None
     """Field of the zone with its least value; None: `MIN_HEIGHT` in a design."""
-    step: float = STEP
+    step: float = SIZE_STEP
     """Increment in a search [m]."""
 
     def limits(self, zone: BarrierZone) -> tuple[float, float]:
@@ -96,8 +96,8 @@ class Length(NamedTuple):
 
 def at_ends(value: float, low: float, high: float, name: str) -> list[str]:
     """Return in words whether a length is at its least or greatest value."""
-    found = [f"least {name}"] if value - low <= NEAR else []
-    return found + ([f"greatest {name}"] if high - value <= NEAR else [])
+    found = [f"least {name}"] if value - low <= BOUND_MARGIN else []
+    return found + ([f"greatest {name}"] if high - value <= BOUND_MARGIN else [])
 
 
 class MeshPrice(Protocol):
@@ -442,7 +442,7 @@ class Standing(Barrier, frozen=True):
     height: Annotated[Metres, about("Height above the highest ground under it.", "m")]
     lengths: ClassVar[tuple[Length, ...]] = (
         Length("height", "max_height"),
-        Length("thickness", "max_thickness", "min_thickness", 0.5 * STEP),
+        Length("thickness", "max_thickness", "min_thickness", 0.5 * SIZE_STEP),
     )
 
     @property
@@ -472,7 +472,7 @@ class Standing(Barrier, frozen=True):
     @classmethod
     def catalogue(cls, zone: BarrierZone) -> Iterator[Self]:
         """Yield barriers of every height, with the least thickness of a gravity wall."""
-        for height in (h for h in HEIGHTS if h <= zone.max_height):
+        for height in (h for h in CATALOGUE_HEIGHTS if h <= zone.max_height):
             thick = min(max(round(SLENDER * height, 1), zone.min_thickness), zone.max_thickness)
             sizes = {"height": height, "thickness": thick}
             yield cls(x=zone.start, **sizes)
@@ -496,7 +496,7 @@ class Standing(Barrier, frozen=True):
         try:
             return x, np.array([ground.height(at) for at in x])
         except BadInput as bad:
-            raise BadInput(f"{self.words} x", self.x, bad.mend) from None
+            raise BadInput(f"{self.words} x", self.x, bad.hint) from None
 
 
 Span = tuple[float, float]
@@ -513,4 +513,4 @@ def occupied(barrier: Barrier, works: Span) -> Span:
 
 def meet(one: Span, two: Span) -> bool:
     """Return whether two barriers are closer than `MIN_GAP`."""
-    return one[0] < two[1] + MIN_GAP - TOLERANCE and two[0] < one[1] + MIN_GAP - TOLERANCE
+    return one[0] < two[1] + MIN_GAP - LIMIT_ROUNDING and two[0] < one[1] + MIN_GAP - LIMIT_ROUNDING

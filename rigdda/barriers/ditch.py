@@ -9,8 +9,8 @@ import msgspec
 import numpy as np
 
 from rigdda.barriers.base import (
+    LIMIT_ROUNDING,
     MIN_HEIGHT,
-    TOLERANCE,
     Drawn,
     Earthwork,
     Floats,
@@ -29,7 +29,10 @@ MIN_FLOOR = 1.0
 """Minimum width of the floor of a designed ditch [m]. A machine must be able to empty it, and rock
 would clog a V-shaped notch."""
 
-DEPTHS, WIDTHS = (0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+CATALOGUE_DEPTHS, CATALOGUE_WIDTHS = (
+    (0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0),
+    (2.0, 3.0, 4.0, 5.0, 6.0, 8.0),
+)
 """Depths and widths of ditches in the catalogue of a search [m]."""
 
 
@@ -105,14 +108,14 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
         """
         assert outline is not None
         prices = site.prices.ditch
-        dearest = max(prices.values(), default=0.0)
+        highest_price = max(prices.values(), default=0.0)
         count = len(outline) // 2 + 1
         x, new = outline[:count].T
         old = np.array([new[0], *outline[: count - 1 : -1, 1], new[-1]])
         depth = np.abs(old - new)
         volume = 0.5 * (depth[1:] + depth[:-1]) * np.diff(x)
         names = [site.surface_at(middle) for middle in 0.5 * (x[1:] + x[:-1])]
-        dug = sum(v * prices.get(n, dearest) for v, n in zip(volume, names, strict=True))
+        dug = sum(v * prices.get(n, highest_price) for v, n in zip(volume, names, strict=True))
         return site.prices.ditch_base + float(dug)
 
     def left_height(self, displacement: float) -> float:
@@ -138,9 +141,9 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
             If they are too steep; the message begins with `where`.
         """
         least = site.ditch_side(self.x, self.width)
-        if self.side_slope < least - TOLERANCE:
-            mend = f"give at least {least:g}, the stable side slope of a cut in this ground"
-            raise BadInput(f"{where}.side_slope", self.side_slope, mend)
+        if self.side_slope < least - LIMIT_ROUNDING:
+            hint = f"give at least {least:g}, the stable side slope of a cut in this ground"
+            raise BadInput(f"{where}.side_slope", self.side_slope, hint)
 
     def placed(self, x: float, site: KnownSite, zone: BarrierZone) -> Self | None:
         """Return it at another chainage with the side slope required there.
@@ -151,15 +154,15 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
         side = site.ditch_side(x, self.width)
         deepest = 0.5 * ((self.width - MIN_FLOOR) / side - abs(high - low))
         depth = min(self.depth, deepest)
-        if depth < MIN_HEIGHT - TOLERANCE:
+        if depth < MIN_HEIGHT - LIMIT_ROUNDING:
             return None
         return msgspec.structs.replace(self, x=x, depth=depth, side_slope=side)
 
     @classmethod
     def catalogue(cls, zone: BarrierZone) -> Iterator[Self]:
         """Yield ditches of every depth and width that the zone permits."""
-        for depth in DEPTHS:
-            for width in WIDTHS:
+        for depth in CATALOGUE_DEPTHS:
+            for width in CATALOGUE_WIDTHS:
                 if depth <= zone.max_depth and zone.min_width <= width <= zone.max_width:
                     yield cls(zone.start, depth, width)
 

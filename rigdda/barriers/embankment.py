@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from rigdda.barriers.base import (
-    HEIGHTS,
+    CATALOGUE_HEIGHTS,
     Barrier,
     Earthwork,
     Floats,
@@ -191,7 +191,7 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
     def catalogue(cls, zone: BarrierZone) -> Iterator[Self]:
         """Yield embankments of every height, with the narrowest crest."""
         crest = cls.least_crest(zone)
-        yield from (cls(zone.start, h, crest) for h in HEIGHTS if h <= zone.max_height)
+        yield from (cls(zone.start, h, crest) for h in CATALOGUE_HEIGHTS if h <= zone.max_height)
 
     def bounds(self, zone: BarrierZone) -> dict[str, tuple[float, float]]:
         """Return the ranges of its height and crest width in a search [m]."""

@@ -10,8 +10,8 @@ from typing import Annotated, ClassVar, NamedTuple, Self
 import msgspec
 
 from rigdda.barriers.base import (
+    CATALOGUE_HEIGHTS,
     FOUNDATION,
-    HEIGHTS,
     MIN_HEIGHT,
     Barrier,
     Floats,
@@ -155,11 +155,11 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         assert self.energy_class is not None
         found = FENCE_CLASSES[self.energy_class]
         if self.height > found.height:
-            mend = f"give at most {found.height:g} m, or a higher class than {self.energy_class} kJ"
-            raise BadInput("fence height", self.height, mend)
+            hint = f"give at most {found.height:g} m, or a higher class than {self.energy_class} kJ"
+            raise BadInput("fence height", self.height, hint)
         if self.elongation not in (None, found.elongation):
-            mend = f"leave it out: it is {found.elongation:g} m for {self.energy_class} kJ"
-            raise BadInput("fence elongation", self.elongation, mend)
+            hint = f"leave it out: it is {found.elongation:g} m for {self.energy_class} kJ"
+            raise BadInput("fence elongation", self.elongation, hint)
         msgspec.structs.force_setattr(self, "elongation", found.elongation)
 
     def for_width(self, width: float) -> Self:
@@ -222,8 +222,8 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
         A fence lower than the minimum height of its class costs as much as one of that height.
         """
         if self.energy_class is None:
-            mend = "give an energy_class instead: only a certified fence has a price"
-            raise BadInput("fence capacity", self.capacity, mend)
+            hint = "give an energy_class instead: only a certified fence has a price"
+            raise BadInput("fence capacity", self.capacity, hint)
         prices, name = site.prices, f"{self.energy_class:g}"
         if name not in prices.fence:
             raise BadInput("fence energy_class", self.energy_class, f"add {name} to prices.fence")
@@ -268,8 +268,8 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
             If it has none; the message begins with `where`.
         """
         if self.energy_class is None:
-            mend = "give its energy class instead of a capacity"
-            raise BadInput(f"{where}.capacity", self.capacity, mend)
+            hint = "give its energy class instead of a capacity"
+            raise BadInput(f"{where}.capacity", self.capacity, hint)
 
     @classmethod
     def of_shares(cls, zone: BarrierZone, x: float, first: float, second: float) -> Self:
@@ -287,7 +287,7 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
     def catalogue(cls, zone: BarrierZone) -> Iterator[Self]:
         """Yield fences of every class and of every height on the market."""
         for name, row in FENCE_CLASSES.items():
-            for height in (h for h in HEIGHTS if h <= zone.max_height):
+            for height in (h for h in CATALOGUE_HEIGHTS if h <= zone.max_height):
                 if row.lowest <= height <= row.height:
                     yield cls(zone.start, height, energy_class=name)
 

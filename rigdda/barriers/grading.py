@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 LEAST_SLOPE, FLATTEST_SLOPE = 0.02, 5.0
 """Steepest and flattest side of an earthwork, run over rise [-]."""
 
-NEAR = 1e-6
+SAME_CORNER = 1e-6
 """Distance within which two corners are merged [m]."""
 
 
@@ -68,14 +68,14 @@ def regrade(
     x = _corners(old, line)
     before, new = np.interp(x, *old.T), pick(np.interp(x, *old.T), np.interp(x, *line.T))
     moved = 0.5 * (np.abs(new - before)[1:] + np.abs(new - before)[:-1])
-    if moved @ np.diff(x) < NEAR:
+    if moved @ np.diff(x) < SAME_CORNER:
         raise BadInput(field, float(start), "move it or make it larger: it changes nothing here")
     outline = np.concatenate([np.column_stack([x, new]), np.column_stack([x, before])[-2:0:-1]])
     first, last = _segments(field, ground, start, end)
     middle = 0.5 * (x[1:] + x[:-1])
     own = first + np.searchsorted(ground.points[first + 1 : last + 1, 0], middle)
     names = [
-        surface if surface is not None and change > NEAR else ground.surfaces[s]
+        surface if surface is not None and change > SAME_CORNER else ground.surfaces[s]
         for s, change in zip(own, moved, strict=True)
     ]
     return outline, _insert(ground, first, last, np.column_stack([x, new]), names)
@@ -100,7 +100,7 @@ def _corners(old: Floats, line: Floats) -> Floats:
     k = np.flatnonzero(over[:-1] * over[1:] < 0.0)
     crossing = x[k] + (x[k + 1] - x[k]) * over[k] / (over[k] - over[k + 1])
     x = np.union1d(x, crossing)
-    inner = x[1:-1][(np.diff(x)[:-1] > NEAR) & (x[-1] - x[1:-1] > NEAR)]
+    inner = x[1:-1][(np.diff(x)[:-1] > SAME_CORNER) & (x[-1] - x[1:-1] > SAME_CORNER)]
     return np.array([x[0], *inner, x[-1]])
 
 
@@ -110,7 +110,7 @@ def _insert(ground: Terrain, first: int, last: int, piece: Floats, names: list[s
     for k in range(1, len(piece) - 1):
         (ax, ay), (bx, by), (cx, cy) = piece[kept[-1]], piece[k], piece[k + 1]
         bend = abs((bx - ax) * (cy - by) - (by - ay) * (cx - bx))
-        if names[k] != names[k - 1] or bend > NEAR * NEAR * (1.0 + (cx - ax) ** 2):
+        if names[k] != names[k - 1] or bend > SAME_CORNER * SAME_CORNER * (1.0 + (cx - ax) ** 2):
             kept.append(k)
     kept.append(len(piece) - 1)
     points = [*ground.points[: first + 1], *piece[kept], *ground.points[last + 1 :]]
@@ -121,7 +121,7 @@ def _insert(ground: Terrain, first: int, last: int, piece: Floats, names: list[s
     ]
     at = first + len(kept)  # index of the last corner of the piece
     for joint, segment in ((at, at), (first, first)):
-        if np.hypot(*(points[joint + 1] - points[joint])) < NEAR:
+        if np.hypot(*(points[joint + 1] - points[joint])) < SAME_CORNER:
             # the piece begins or ends at a corner of the ground
             del points[joint + 1 if joint == at else joint], surfaces[segment]
     return Terrain(np.array(points), surfaces)

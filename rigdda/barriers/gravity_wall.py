@@ -12,8 +12,8 @@ import shapely
 
 from rigdda.barriers.base import (
     ELEMENT,
+    LIMIT_ROUNDING,
     SLENDER,
-    TOLERANCE,
     Barrier,
     Drawn,
     Floats,
@@ -137,9 +137,9 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
             If it is not; the message begins with `where`.
         """
         least = SLENDER * self.height
-        if self.thickness < least - TOLERANCE:
-            mend = f"give at least {least:g}: {SLENDER:g} times the height"
-            raise BadInput(f"{where}.thickness", self.thickness, mend)
+        if self.thickness < least - LIMIT_ROUNDING:
+            hint = f"give at least {least:g}: {SLENDER:g} times the height"
+            raise BadInput(f"{where}.thickness", self.thickness, hint)
 
     def placed(self, x: float, site: KnownSite, zone: BarrierZone) -> Self:
         """Return it at another chainage, with the thickness required by its height.

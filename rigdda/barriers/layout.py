@@ -113,7 +113,7 @@ def from_table(where: str, table: Any) -> Barrier:
     try:
         return kind(**values)
     except BadInput as bad:
-        raise BadInput(f"{where}: {bad.field}", bad.value, bad.mend) from None
+        raise BadInput(f"{where}: {bad.field}", bad.value, bad.hint) from None
 
 
 def to_tables(layout: Sequence[Barrier]) -> list[dict[str, Any]]:

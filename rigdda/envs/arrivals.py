@@ -26,7 +26,7 @@ from rigdda.envs.intervals import Estimate, estimate
 from rigdda.model.site_tables import ARRIVAL, MOST_OFTEN, RELEASE, Event
 from rigdda.releases import as_site
 
-LEAST, MOST = 64, 2048
+LEAST_RELEASES, MOST_RELEASES = 64, 2048
 """Least and greatest number of releases of an event from which p is estimated."""
 
 ENOUGH = 0.05
@@ -106,29 +106,29 @@ def _converted(site: Site, event: Event, executor: Executor | None) -> ReleaseRa
     """Return the rate of the releases of an event whose rate is that of arrivals."""
     chance = _chance(site, event.name, executor)
     if chance.count == 0:
-        mend = (
+        hint = (
             f"give the rate of releases: rock of this event reaches the road in none of "
             f"{chance.releases:,} releases without new barriers, so that its rate does not follow "
             "from that of arrivals"
         )
-        raise BadInput(f"{event.words}.rate_of", event.rate_of, mend)
+        raise BadInput(f"{event.words}.rate_of", event.rate_of, hint)
     rate = event.rate / chance.probability
     if rate > MOST_OFTEN:
-        mend = (
+        hint = (
             f"give a lower rate of arrivals: this is {rate:,.0f} releases a year on 100 m, at most "
             f"{MOST_OFTEN:g}"
         )
-        raise BadInput(f"{event.words}.rate", event.rate, mend)
+        raise BadInput(f"{event.words}.rate", event.rate, hint)
     return ReleaseRate(event.name, event.rate, chance, rate)
 
 
 def _chance(site: Site, event: str, executor: Executor | None) -> Estimate:
     """Return the probability that rock of an event reaches the road without new barriers."""
-    count = LEAST
+    count = LEAST_RELEASES
     while True:
         outcomes = bare_outcomes(site, {event: count}, executor)[event]
         chance = estimate(sum(outcome.reached for outcome in outcomes), count)
         p = chance.probability
-        if count >= MOST or (p > 0.0 and math.sqrt((1.0 - p) / (p * count)) <= ENOUGH):
+        if count >= MOST_RELEASES or (p > 0.0 and math.sqrt((1.0 - p) / (p * count)) <= ENOUGH):
             return chance
         count *= 2

@@ -20,7 +20,7 @@ from rigdda.envs.fence_checks import Action, Demand, FenceCheck
 from rigdda.envs.ritchie_ditch import RitchieDitch
 from rigdda.limit_equilibrium import Impact
 
-ROCK, OTHER = 1e6, 2e5
+PRESSURE_ON_ROCK, PRESSURE_ON_SOIL = 1e6, 2e5
 """Admissible pressure on rock and on other ground [Pa]; presumed values of BS 8004:1986, from
 memory."""
 
@@ -32,7 +32,7 @@ PUSHED = 0.5
 embankments of reinforced soil held impacts that displaced them by more (Peila et al. 2007,
 Landslides 4, 255-265, from memory)."""
 
-SLIDING, OVERTURNING = 1.5, 2.0
+SLIDING_SAFETY, OVERTURNING_SAFETY = 1.5, 2.0
 """Factors of safety that are customary under permanent loads [-]. Under the design impact, which
 has its own partial factors and is accidental, 1 is enough."""
 
@@ -142,7 +142,9 @@ def _structure(
     if isinstance(barrier, GravityWall):
         thrust = limit_equilibrium.rock_thrust(barrier.height, LOOSE, REPOSE)
         lever, note = barrier.height / 3.0, "rock at rest up to its crest"
-        yield from _stands(head, base, "rock", thrust, lever, SLIDING, OVERTURNING, note)
+        yield from _stands(
+            head, base, "rock", thrust, lever, SLIDING_SAFETY, OVERTURNING_SAFETY, note
+        )
 
 
 class Base(NamedTuple):
@@ -186,7 +188,7 @@ class Base(NamedTuple):
             weight=weight,
             width=barrier.thickness if isinstance(barrier, GravityWall) else 0.0,
             friction=math.tan(math.radians(min(scene.friction_deg(own, name) for name in below))),
-            bearing=ROCK if set(below) == {"rock"} else OTHER,
+            bearing=PRESSURE_ON_ROCK if set(below) == {"rock"} else PRESSURE_ON_SOIL,
             restitution=scene.interface(touched, own).restitution or 0.0,
             gravity=gravity,
         )

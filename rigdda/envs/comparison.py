@@ -21,7 +21,7 @@ from rigdda.envs.cost import Account, Facts, account
 from rigdda.envs.intervals import Known, Mean, cost
 from rigdda.envs.problem import DesignProblem
 
-LEAST = 2
+LEAST_PER_EVENT = 2
 """Least number of releases of each event needed to estimate a difference."""
 
 
@@ -91,7 +91,7 @@ def difference(
     Raises
     ------
     BadInput
-        If an event with a non-zero rate has fewer than `LEAST` releases.
+        If an event with a non-zero rate has fewer than `LEAST_PER_EVENT` releases.
     """
     one, two = (account(site, a, b) for a, b in zip(layouts, outcomes, strict=True))
     return difference_of_accounts(site, layouts, (one, two), facts)
@@ -110,7 +110,7 @@ def difference_of_accounts(
     Raises
     ------
     BadInput
-        If an event with a non-zero rate has fewer than `LEAST` releases.
+        If an event with a non-zero rate has fewer than `LEAST_PER_EVENT` releases.
     """
     one, two = accounts
     value = site.annual(layouts[0]) - site.annual(layouts[1])
@@ -120,16 +120,17 @@ def difference_of_accounts(
         if not any(rates):
             continue
         own = one.event == name
-        if own.sum() < LEAST:
-            mend = f"give {LEAST} or more per event: at least {LEAST * len(site.events)} seeds"
-            raise BadInput("seeds", f"{own.sum()} of {name}", mend)
+        if own.sum() < LEAST_PER_EVENT:
+            least = LEAST_PER_EVENT * len(site.events)
+            hint = f"give {LEAST_PER_EVENT} or more per event: at least {least} seeds"
+            raise BadInput("seeds", f"{own.sum()} of {name}", hint)
         more = rates[0] * _spent(one)[own] - rates[1] * _spent(two)[own]
         differ += int(np.count_nonzero(more))
         value += float(more.mean())
         if layouts[0] == layouts[1]:
             continue
-        dear = facts[name].harm
-        known = Known(max(rates) * dear.mean, dear.variation)
+        harm = facts[name].harm
+        known = Known(max(rates) * harm.mean, harm.variation)
         up, down = (cost(np.maximum(part, 0.0), part > 0.0, known) for part in (more, -more))
         below += _below(up) ** 2 + _above(down) ** 2
         above += _above(up) ** 2 + _below(down) ** 2

@@ -45,7 +45,7 @@ from rigdda.envs.site_sampling import EpisodeSites, Place, Places, drawn_from
 from rigdda.model.corridor import is_corridor
 from rigdda.model.corridor import names as corridor_names
 
-SECTIONS = 12
+DEFAULT_SECTIONS = 12
 """Default number of sections of an episode."""
 
 ROUNDING = 1e-9
@@ -60,7 +60,7 @@ BUDGETS = (30.0, 1600.0)
 LENGTHS = (50.0, 300.0)
 """Range of the lengths of sections [m]."""
 
-FIELDS: dict[str, observation.Field] = {
+CORRIDOR_FIELDS: dict[str, observation.Field] = {
     "length": observation.Field(1, 2.1, 0.25, "log10 of the length of the section [m]"),
     "metres": observation.Field(
         1, 0.5, 0.3, "share of the road of the corridor that is left, with this section"
@@ -102,8 +102,8 @@ class CorridorDesign(LayoutEnv):
         left is not built.
     Observation
         Dict of 1-D float32 arrays, or their concatenation if `flat`: that of `BarrierDesign` for
-        the current section, and `FIELDS` for the corridor. It depends neither on the releases of
-        the episode nor on a simulation with barriers.
+        the current section, and `CORRIDOR_FIELDS` for the corridor. It depends neither on the
+        releases of the episode nor on a simulation with barriers.
     Reward
         Length x (Z without barriers - Z of the layout) of the section, divided by the sum of
         length x Z without barriers of the corridor. The rewards of an episode add up to the
@@ -176,7 +176,7 @@ class CorridorDesign(LayoutEnv):
         self._corridor, self._names = _places(site)
         self._sites = EpisodeSites("train", max_barriers, kinds, fidelity)
         most = len(self._corridor.sections) if self._corridor else len(self._names)
-        usual = most if self._corridor else min(SECTIONS, most)
+        usual = most if self._corridor else min(DEFAULT_SECTIONS, most)
         self.sections = check.integer(
             "sections", usual if sections is None else sections, 1, min(most, MOST_SECTIONS)
         )
@@ -188,7 +188,7 @@ class CorridorDesign(LayoutEnv):
         slots = self._sites.slots
         own = {
             name: spaces.Box(-observation.BOUND, observation.BOUND, (f.size,), np.float32)
-            for name, f in FIELDS.items()
+            for name, f in CORRIDOR_FIELDS.items()
         }
         space = spaces.Dict({**observation.space(slots.size, max_barriers, False).spaces, **own})
         options = record, record_trigger, render_mode
@@ -354,7 +354,7 @@ class CorridorDesign(LayoutEnv):
         }
         seen = observation.observe(section.problem)
         for name, value in values.items():
-            field = FIELDS[name]
+            field = CORRIDOR_FIELDS[name]
             scaled = (np.asarray(value, dtype=np.float64) - field.centre) / field.spread
             bound = observation.BOUND
             seen[name] = np.clip(scaled, -bound, bound).astype(np.float32)
@@ -445,7 +445,7 @@ def _places(site: Any) -> tuple[Corridor | None, tuple[Place, ...]]:
                 return Corridor.load(site), ()
         except BadInput as bad:
             field = "site" if bad.field == "corridor" else bad.field
-            raise BadInput(field, bad.value, bad.mend) from None
+            raise BadInput(field, bad.value, bad.hint) from None
     drawn = drawn_from(site)
     if drawn and isinstance(site, str):
         return None, drawn

@@ -223,4 +223,4 @@ def difference(one: Mean, other: Mean) -> Interval:
 
 def _of_section(name: str, bad: BadInput) -> BadInput:
     """Return an error about a section with the name of the section."""
-    return BadInput(f"sections.{name}.{bad.field}", bad.value, bad.mend)
+    return BadInput(f"sections.{name}.{bad.field}", bad.value, bad.hint)

@@ -268,7 +268,9 @@ def account(site: Site, layout: Layout, outcomes: Sequence[Outcome]) -> Account:
         failed=np.array([any(b.failed for b in o.barriers) for o in outcomes], dtype=bool),
         toll=None
         if site.traffic is None
-        else np.array([site.toll(layout, outcome) for outcome in outcomes], dtype=np.float64),
+        else np.array(
+            [site.traffic_consequences(layout, outcome) for outcome in outcomes], dtype=np.float64
+        ),
     )
 
 
@@ -300,7 +302,7 @@ def learn(site: Site, own: Account, released: Floats, widths: Floats, blocks: fl
         if site.traffic is not None:
             ones = np.ones(len(released), dtype=bool)
             toll = np.column_stack(
-                site.traffic.toll(ones, ones, widths, volume, np.full(len(ones), np.inf))
+                site.traffic.consequences(ones, ones, widths, volume, np.full(len(ones), np.inf))
             )
             harm = harm + site.traffic.price(toll[:, 2])
     tolls = () if toll is None else tuple(map(_known_of, toll.T))

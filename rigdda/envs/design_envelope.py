@@ -1,12 +1,12 @@
 """Envelope for the design of a fence: what the blocks of the design events do along a zone.
 
-Each design event is simulated, usually without barriers, until at least `BLOCKS` of its blocks were
-released. Quantiles of velocity and bounce height are taken at fixed stations and smoothed along the
-slope by local linear regression with tricube weights (Cleveland 1979, Journal of the American
-Statistical Association 74, 829-836; Fan and Gijbels, Local Polynomial Modelling and Its
-Applications, Chapman and Hall 1996). A characteristic value is never below the quantile recorded at
-its station: the regression only raises what a station lacks by chance, and fills narrow dips, in
-which no fence can be placed exactly.
+Each design event is simulated, usually without barriers, until at least `LEAST_BLOCKS` of its
+blocks were released. Quantiles of velocity and bounce height are taken at fixed stations and
+smoothed along the slope by local linear regression with tricube weights (Cleveland 1979, Journal of
+the American Statistical Association 74, 829-836; Fan and Gijbels, Local Polynomial Modelling and
+Its Applications, Chapman and Hall 1996). A characteristic value is never below the quantile
+recorded at its station: the regression only raises what a station lacks by chance, and fills narrow
+dips, in which no fence can be placed exactly.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from rigdda.passages import Passages, passages
 
 Floats = NDArray[np.float64]
 
-BLOCKS = 2000
+LEAST_BLOCKS = 2000
 """Least number of blocks that are released in each design event. The standard error of a 95 %
 quantile of the velocity is then about 1 %."""
 
-SPACING, MOST = 1.0, 100
+SPACING, MOST_STATIONS = 1.0, 100
 """Largest distance between stations [m] and largest number of stations."""
 
 BANDWIDTH = 2.0
 """Distance at which the weight of another station in the regression is 0, in units of the distance
 between stations."""
 
-SEEDS = 2**34
+FIRST_SEED = 2**34
 """First seed of the releases; episodes, envelopes and ensembles use smaller ones."""
 
 
@@ -105,7 +105,7 @@ class EventEnvelope(msgspec.Struct, frozen=True):
     radius: float
 
 
-NAME = "design_envelope"
+STORED_AS = "design_envelope"
 """Name under which design envelopes are stored on disk; see `rigdda.envs.site_store`."""
 
 memory: Memory[bytes, DesignEnvelope] = Memory(256)
@@ -114,7 +114,7 @@ memory: Memory[bytes, DesignEnvelope] = Memory(256)
 
 def stations(zone: BarrierZone) -> list[float]:
     """Return evenly spaced stations from the start to the end of a zone [m]."""
-    count = min(MOST, max(2, math.ceil((zone.end - zone.start) / SPACING) + 1))
+    count = min(MOST_STATIONS, max(2, math.ceil((zone.end - zone.start) / SPACING) + 1))
     return [float(x) for x in np.linspace(zone.start, zone.end, count).round(3)]
 
 
@@ -128,7 +128,7 @@ def of(
     site: Site,
     zone: BarrierZone,
     seed: int = 0,
-    blocks: int = BLOCKS,
+    blocks: int = LEAST_BLOCKS,
     layout: Sequence[Barrier] = (),
 ) -> DesignEnvelope:
     """Return the design envelope of a site, simulating it if it is not stored.
@@ -158,10 +158,10 @@ def of(
     bare = msgspec.structs.replace(site, existing=()) if site.existing else site
     names = governing_events(site)
     key = _key(release_key(bare).hex(), names, lines, seed, blocks, level, to_tables(built))
-    known = memory.recall([key]).get(key) or site_store.read(NAME, key, DesignEnvelope)
+    known = memory.recall([key]).get(key) or site_store.read(STORED_AS, key, DesignEnvelope)
     if known is None:
         known = _simulate(bare, built, lines, seed, blocks, level)
-        site_store.write(NAME, key, known)
+        site_store.write(STORED_AS, key, known)
     memory.remember({key: known})
     return known
 
@@ -178,7 +178,7 @@ def _simulate(
     at = [*lines, site.road.start] if lines[-1] < site.road.start else lines
     events, through, reached = [], np.zeros(len(lines)), 0
     for name in governing_events(site):
-        first = SEEDS + seed * 2**20
+        first = FIRST_SEED + seed * 2**20
         releases = [(first + i, name) for i in range(math.ceil(blocks / largest(site, name)))]
         found = passages(site, layout, releases, at)
         while len(found.stops) < blocks:  # events with a random number of blocks

@@ -31,19 +31,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda import BadInput, Barrier, Layout, Mesh
 from rigdda.barriers import KINDS, Removal
-from rigdda.barriers.base import MIN_HEIGHT, TOLERANCE, Span, share_of
+from rigdda.barriers.base import LIMIT_ROUNDING, MIN_HEIGHT, Span, share_of
 from rigdda.envs.siting import FeasiblePlaces
 from rigdda.ground.barrier_zone import BarrierZone
 
 Floats = NDArray[np.float64]
 
-NUMBERS = 4
+SLOT_NUMBERS = 4
 """Length of a slot without the scores of the kinds."""
 
 
 def slot_size(kinds: Sequence[str]) -> int:
     """Return the length of a slot for a choice of kinds."""
-    return NUMBERS + (len(kinds) if len(kinds) > 1 else 0)
+    return SLOT_NUMBERS + (len(kinds) if len(kinds) > 1 else 0)
 
 
 def vector(field: str, value: ArrayLike, size: int) -> Floats:
@@ -100,8 +100,8 @@ def built_and_dropped(
     for number, slot in enumerate(values.reshape(-1, slot_size(kinds))):
         if slot[0] <= 0.0:
             continue
-        kind = kinds[int(np.argmax(slot[NUMBERS:]))] if len(kinds) > 1 else kinds[0]
-        station, height, size = (0.5 * (slot[1:NUMBERS] + 1.0)).tolist()
+        kind = kinds[int(np.argmax(slot[SLOT_NUMBERS:]))] if len(kinds) > 1 else kinds[0]
+        station, height, size = (0.5 * (slot[1:SLOT_NUMBERS] + 1.0)).tolist()
         if kind == "mesh":
             if any(isinstance(barrier, Mesh) for barrier in built):
                 dropped.append(f"slot {number}: mesh: an earlier slot already has a mesh")
@@ -157,9 +157,9 @@ def encode(place: FeasiblePlaces, layout: Layout, slots: int, kinds: Sequence[st
     out = np.full((slots, slot_size(kinds)), -1.0)
     for i, barrier in enumerate(layout):
         out[i, 0] = 1.0
-        out[i, 1:NUMBERS] = _numbers(place, i, barrier)
+        out[i, 1:SLOT_NUMBERS] = _numbers(place, i, barrier)
         if len(kinds) > 1:
-            out[i, NUMBERS + list(kinds).index(barrier.kind)] = 1.0
+            out[i, SLOT_NUMBERS + list(kinds).index(barrier.kind)] = 1.0
     return np.clip(out.ravel(), -1.0, 1.0)
 
 
@@ -176,9 +176,9 @@ def _numbers(place: FeasiblePlaces, i: int, barrier: Barrier) -> list[float]:
     else:
         shares = (share_of(barrier.x, zone.start, zone.end), *barrier.shares(zone))
         tall = getattr(barrier, barrier.lengths[0].field)
-        if tall < MIN_HEIGHT - TOLERANCE:
-            mend = f"give a number of at least {MIN_HEIGHT:g}"
-            raise BadInput(f"layout[{i}].{barrier.lengths[0].field}", tall, mend)
+        if tall < MIN_HEIGHT - LIMIT_ROUNDING:
+            hint = f"give a number of at least {MIN_HEIGHT:g}"
+            raise BadInput(f"layout[{i}].{barrier.lengths[0].field}", tall, hint)
         clipped = np.clip(shares, 0.0, 1.0).tolist()
         usual = place.put(make(zone, barrier.kind, *clipped), barrier.x) or barrier
     _check_usual(f"layout[{i}]", barrier, usual)

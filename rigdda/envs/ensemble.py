@@ -21,17 +21,17 @@ from rigdda.envs.cost import Evaluation, Facts, account, judge, learn
 from rigdda.envs.outcome_cache import Memory
 from rigdda.releases import check_duration
 
-SEEDS = 2**33
+FIRST_SEED = 2**33
 """First seed of the releases used for barrier-free statistics. Episodes use seeds below 2**31, and
 envelopes use seeds from 2**32."""
 
-FIRST, ALL = 32, 2048
+FIRST_ROUND, BOTH_ROUNDS = 32, 2048
 """Number of releases of each event in the first round, and total number in both rounds together."""
 
-FIRST_SEEDS = range(SEEDS, SEEDS + FIRST)
+FIRST_SEEDS = range(FIRST_SEED, FIRST_SEED + FIRST_ROUND)
 """Seeds of the first round."""
 
-FLOOR = 0.2
+LEAST_EVENT_SHARE = 0.2
 """Minimum share of an event of single blocks relative to an equal share; events with more blocks
 have a lower minimum because they take longer to simulate. It ensures that events which are rare or
 cause no cost without barriers are sampled, too."""
@@ -40,7 +40,7 @@ DESIGN_FLOOR = 1.0 / 30.0
 """Least share of the releases for a design event [-]. Of 3,000 releases at least 100 are of this
 event: if no block reaches the road in any of them, the probability is below 3 % (95 %)."""
 
-OWN_TIME, CROWDED = 1.0, 1.2
+OWN_TIME, BLOCK_COST = 1.0, 1.2
 """Model of the processor time of a release relative to that of one block [-]: a constant part, plus
 the number of blocks raised to a power. On `shu-hwa` releases of 1, 7 and 120 blocks take 1.5, 5 and
 450 ms."""
@@ -82,7 +82,7 @@ class Ensemble:
         return shares
 
 
-NAME = "ensemble"
+STORED_AS = "ensemble"
 """Name under which ensembles are stored on disk; see `rigdda.envs.site_store`."""
 
 memory: Memory[bytes, Ensemble] = Memory(4096)
@@ -106,10 +106,10 @@ def of(site: Site, key: bytes, executor: Executor | None = None) -> Ensemble:
     """
     known = memory.recall([key]).get(key)
     if known is None:
-        known = site_store.read(NAME, key, Ensemble)
+        known = site_store.read(STORED_AS, key, Ensemble)
         if known is None:
             known = _simulate(site, executor)
-            site_store.write(NAME, key, known)
+            site_store.write(STORED_AS, key, known)
         memory.remember({key: known})
     return known
 
@@ -117,11 +117,11 @@ def of(site: Site, key: bytes, executor: Executor | None = None) -> Ensemble:
 def _simulate(site: Site, executor: Executor | None) -> Ensemble:
     """Simulate an equal number of releases of each event, then more where they reduce variance."""
     names = site.event_names
-    first = bare_outcomes(site, dict.fromkeys(names, FIRST), executor)
-    wanted = _shared(_shares(site, _facts(site, _joined(first))), ALL)
-    counts = {name: max(wanted[name], FIRST) for name in names}
+    first = bare_outcomes(site, dict.fromkeys(names, FIRST_ROUND), executor)
+    wanted = _shared(_shares(site, _facts(site, _joined(first))), BOTH_ROUNDS)
+    counts = {name: max(wanted[name], FIRST_ROUND) for name in names}
     more = bare_outcomes(site, counts, executor)
-    both = _joined(first) + _joined({name: more[name][FIRST:] for name in names})
+    both = _joined(first) + _joined({name: more[name][FIRST_ROUND:] for name in names})
     facts = _facts(site, both)
     bare = judge(site, (), both, {}, {})
     found = replace(bare, outcomes=(), simulated=len(both), seconds=0.0)
@@ -145,7 +145,7 @@ def bare_outcomes(
     site : Site
         The site, with its existing barriers.
     counts : mapping of str to int
-        Number of releases of each event; their seeds begin at `SEEDS`.
+        Number of releases of each event; their seeds begin at `FIRST_SEED`.
     executor : Executor, optional
         Where to run the simulations; by default in threads on all cores.
 
@@ -163,7 +163,7 @@ def bare_outcomes(
     stored = _joined(known)
     check_duration([site] * len(stored), stored)
     jobs = [
-        (site, (), SEEDS + i, name)
+        (site, (), FIRST_SEED + i, name)
         for name, count in counts.items()
         for i in range(len(known[name]), count)
     ]
@@ -235,20 +235,23 @@ def _shares(site: Site, facts: Mapping[str, Facts]) -> dict[str, float]:
     free = all(fact.harm.mean == 0.0 for fact in facts.values())  # then the debris is used instead
     weight = {}
     for name, fact in facts.items():
-        dear = fact.volume if free else fact.harm
+        loss = fact.volume if free else fact.harm
         chance = min((fact.reached + 0.5) / (fact.releases + 1.0), 0.5)
-        spread = dear.mean * math.sqrt(chance * (1.0 - chance) + chance * dear.variation**2)
+        spread = loss.mean * math.sqrt(chance * (1.0 - chance) + chance * loss.variation**2)
         weight[name] = site.rate(name, ()) * spread / math.sqrt(_time(fact))
     whole = sum(weight.values())
     equal = 1.0 / len(weight)
-    least = {name: FLOOR * equal * (OWN_TIME + 1.0) / _time(fact) for name, fact in facts.items()}
+    least = {
+        name: LEAST_EVENT_SHARE * equal * (OWN_TIME + 1.0) / _time(fact)
+        for name, fact in facts.items()
+    }
     raised = {n: max(w / whole if whole else equal, least[n]) for n, w in weight.items()}
     return {name: share / sum(raised.values()) for name, share in raised.items()}
 
 
 def _time(fact: Facts) -> float:
     """Return the processor time of a release of an event relative to that of one block [-]."""
-    return float(OWN_TIME + fact.blocks**CROWDED)
+    return float(OWN_TIME + fact.blocks**BLOCK_COST)
 
 
 def _shared(shares: Mapping[str, float], releases: int) -> dict[str, int]:

@@ -19,10 +19,10 @@ from rigdda.geometry import polygon_properties
 
 Floats = NDArray[np.float64]
 
-STATIONS = 16
+ZONE_STATIONS = 16
 """Number of stations across the barrier zone."""
 
-BINS = 8
+DEPOSIT_BINS = 8
 """Number of equal bins from the start of the zone to the downhill edge of the road in which the
 deposit is counted. There is one more bin uphill of the zone and one beyond the road."""
 
@@ -30,13 +30,13 @@ QUANTILE = 0.95
 """Quantile of the energies and bounce heights of passing blocks that the envelope gives; the usual
 basis for the design of barriers."""
 
-CLASSES = ("single blocks", "groups")
+EVENT_CLASSES = ("single blocks", "groups")
 """Classes of events: blocks that fall alone, and blocks that interact with each other."""
 
-FIRST = 2**32
+FIRST_SEED = 2**32
 """First seed of the releases used for envelopes; environments use seeds below 2**31 for scoring."""
 
-BLOCKS, LEAST = 16, 2
+BLOCKS_PER_EVENT, LEAST_RELEASES = 16, 2
 """Number of blocks simulated for each event, and minimum number of its releases."""
 
 Job = tuple[Site, tuple[()], int, str]
@@ -50,7 +50,7 @@ class Envelope:
     Parameters
     ----------
     often : (2, STATIONS) array
-        Rate at which releases pass each station [1/year per 100 m], for each of `CLASSES`.
+        Rate at which releases pass each station [1/year per 100 m], for each of `EVENT_CLASSES`.
     energy : (2, STATIONS) array
         95 % quantile of the kinetic energy of the blocks that pass a station [J]; 0 if none does.
     bounce : (2, STATIONS) array
@@ -101,7 +101,7 @@ class StoredEnvelope(NamedTuple):
         return Envelope(*arrays)
 
 
-NAME = "envelope"
+STORED_AS = "envelope"
 """Name under which envelopes are stored on disk; see `rigdda.envs.site_store`."""
 
 memory: Memory[bytes, Envelope] = Memory(8192)
@@ -110,7 +110,7 @@ memory: Memory[bytes, Envelope] = Memory(8192)
 
 def stations(site: Site) -> Floats:
     """Return the chainages of the stations, (STATIONS,) [m]."""
-    return np.linspace(site.barrier_zone.start, site.barrier_zone.end, STATIONS)
+    return np.linspace(site.barrier_zone.start, site.barrier_zone.end, ZONE_STATIONS)
 
 
 def largest(site: Site, event: str) -> int:
@@ -146,7 +146,7 @@ def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> lis
     keys = [fingerprint(site) for site in sites]
     known = memory.recall(keys)
     for key in {*keys} - known.keys():
-        stored = site_store.read(NAME, key, StoredEnvelope)
+        stored = site_store.read(STORED_AS, key, StoredEnvelope)
         if stored is not None:
             known[key] = stored.envelope
             memory.remember({key: known[key]})
@@ -159,7 +159,7 @@ def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> lis
             for key, own in jobs.items()
         }
     for key, found in fresh.items():
-        site_store.write(NAME, key, StoredEnvelope.of(found))
+        site_store.write(STORED_AS, key, StoredEnvelope.of(found))
     memory.remember(fresh)
     known |= fresh
     return [known[key] for key in keys]
@@ -167,8 +167,13 @@ def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> lis
 
 def _jobs(site: Site) -> list[Job]:
     """Return the releases for the envelope of a site; fewer for events with many blocks."""
-    counts = {name: max(LEAST, BLOCKS // largest(site, name)) for name in site.event_names}
-    return [(site, (), FIRST + i, name) for name, count in counts.items() for i in range(count)]
+    counts = {
+        name: max(LEAST_RELEASES, BLOCKS_PER_EVENT // largest(site, name))
+        for name in site.event_names
+    }
+    return [
+        (site, (), FIRST_SEED + i, name) for name, count in counts.items() for i in range(count)
+    ]
 
 
 def _transit(job: Job) -> Transit:
@@ -178,7 +183,7 @@ def _transit(job: Job) -> Transit:
     scene = site.realise(layout, seed, event)
     simulation = Simulation(scene, site.settings(scene), lines)
     run = simulation.run(site.motion.duration, site.motion.duration)
-    passing = [run.crossings(i) for i in range(STATIONS)]
+    passing = [run.crossings(i) for i in range(ZONE_STATIONS)]
     energy, bounce = ([p[name] for p in passing] for name in ("energy", "height"))
     return Transit(energy, bounce, _deposit(site, run))
 
@@ -189,11 +194,11 @@ def _summary(site: Site, jobs: Sequence[Job], transits: Sequence[Transit]) -> En
     rates = {name: site.rate(name, ()) for name in site.event_names}
     weights = np.array([100.0 * rates[name] / names.count(name) for name in names])
     groups = np.array([largest(site, name) > 1 for name in names])
-    often, energy, bounce = np.zeros((3, 2, STATIONS))
-    out = Envelope(often, energy, bounce, np.zeros(BINS + 2))
+    often, energy, bounce = np.zeros((3, 2, ZONE_STATIONS))
+    out = Envelope(often, energy, bounce, np.zeros(DEPOSIT_BINS + 2))
     for kind, mine in enumerate((~groups, groups)):
         own = [(transits[i], float(weights[i])) for i in np.flatnonzero(mine).tolist()]
-        for k in range(STATIONS):
+        for k in range(ZONE_STATIONS):
             out.often[kind, k] = sum(weight for transit, weight in own if len(transit.energy[k]))
             for name in ("energy", "bounce"):
                 values = [getattr(transit, name)[k] for transit, _ in own]
@@ -221,7 +226,7 @@ def _quantile(parts: Sequence[Floats], weights: Sequence[float]) -> float:
 
 def _deposit(site: Site, run: Run) -> Floats:
     """Return the final block area in each bin, (BINS + 2,) [m2]; see `Envelope`."""
-    edges = np.linspace(site.barrier_zone.start, site.road.end, BINS + 1)
+    edges = np.linspace(site.barrier_zone.start, site.road.end, DEPOSIT_BINS + 1)
     part = np.searchsorted(edges, run.poses[-1, :, 0])
     area = [polygon_properties(block.vertices)[0] for block in run.scene.blocks]
-    return np.bincount(part, area, BINS + 2).astype(np.float64)
+    return np.bincount(part, area, DEPOSIT_BINS + 2).astype(np.float64)

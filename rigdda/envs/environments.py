@@ -22,7 +22,7 @@ import rigdda
 from rigdda import BadInput, Layout, Outcome, Run, check
 from rigdda.envs import encoding, observation, outcome_cache
 from rigdda.envs.cost import Evaluation
-from rigdda.envs.envelope import FIRST, barrier_free
+from rigdda.envs.envelope import FIRST_SEED, barrier_free
 from rigdda.envs.outcome_cache import Sample
 from rigdda.envs.problem import DesignProblem, Targets
 from rigdda.envs.recorder import Recorder, Shown, Trigger
@@ -32,12 +32,12 @@ from rigdda.envs.site_sampling import EpisodeSites, Places, Slots
 
 
 class Ask(NamedTuple):
-    """A layout to evaluate on releases `seeds`, and to observe in `looks` releases per event."""
+    """A layout to evaluate on releases `seeds`, and to observe in `observed_releases` per event."""
 
     problem: DesignProblem
     layout: Layout
     seeds: tuple[int, ...]
-    looks: int
+    observed_releases: int
 
 
 class Answer(NamedTuple):
@@ -65,16 +65,16 @@ def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> li
     for ask in asks:
         if ask is not None:
             events = ask.problem.plan(ask.seeds) if ask.seeds else ()
-            drawn = [*zip(ask.seeds, events, strict=True), *_looks(ask)]
+            drawn = [*zip(ask.seeds, events, strict=True), *_observation_releases(ask)]
             jobs += [(ask.problem.site, ask.layout, seed, event) for seed, event in drawn]
             ends += [len(jobs) - len(drawn) + len(ask.seeds), len(jobs)]
     parts = iter(outcome_cache.outcomes(jobs, executor).split(ends))
     return [None if ask is None else _answer(ask, next(parts), next(parts)) for ask in asks]
 
 
-def _looks(ask: Ask) -> list[tuple[int, str]]:
+def _observation_releases(ask: Ask) -> list[tuple[int, str]]:
     """Return the seed and event of each observation release."""
-    seeds = range(FIRST, FIRST + ask.looks)
+    seeds = range(FIRST_SEED, FIRST_SEED + ask.observed_releases)
     return [(seed, name) for name in ask.problem.site.event_names for seed in seeds]
 
 
@@ -101,7 +101,7 @@ def simulate_observations(
         If a simulation diverges.
     """
     barrier_free([problem.site for problem, _ in episodes], executor)
-    answers = simulate([Ask(problem, (), (), looks) for problem, looks in episodes], executor)
+    answers = simulate([Ask(problem, (), (), releases) for problem, releases in episodes], executor)
     return [answer.observed for answer in answers if answer is not None]
 
 
@@ -132,7 +132,7 @@ SCORED_SEEDS = 2**31
 MOST_RELEASES = 100_000
 """Maximum number of releases of an episode; all of them are simulated in every step."""
 
-MOST_LOOKS = 4
+MOST_OBSERVED_RELEASES = 4
 """Maximum number of observation releases per event; it is also limited to the number of scored
 ones."""
 
@@ -229,7 +229,7 @@ class BarrierEnv(LayoutEnv):
         Provides the site of each episode.
     """
 
-    looks: ClassVar[bool]
+    observes_layout: ClassVar[bool]
     """Whether the current layout is simulated and observed after every step."""
 
     def __init__(
@@ -250,7 +250,7 @@ class BarrierEnv(LayoutEnv):
         limits = targets, max_cost, checks
         self.sites = EpisodeSites(site, max_barriers, kinds, fidelity, *limits)
         self.problem, slots = self.sites.first, self.sites.slots
-        space = observation.space(slots.size, max_barriers, self.looks)
+        space = observation.space(slots.size, max_barriers, self.observes_layout)
         options = record, record_trigger, render_mode
         super().__init__(slots, self.width_of(slots), space, releases, flat, *options)
         self._numbers = np.zeros(0)  # all actions of this episode so far
@@ -318,7 +318,7 @@ class BarrierEnv(LayoutEnv):
     @property
     def observed_releases(self) -> int:
         """Number of observation releases per event."""
-        return min(self.releases, MOST_LOOKS) if self.looks else 0
+        return min(self.releases, MOST_OBSERVED_RELEASES) if self.observes_layout else 0
 
     def tell(self, answer: Answer | None) -> Step:
         """Finish the step with the result of its ask."""
@@ -340,7 +340,7 @@ class BarrierEnv(LayoutEnv):
         """Return the observation and the info of the current layout."""
         now, self._shown = self._stages[-1], None
         seen = observation.observe(self.problem)
-        if self.looks:
+        if self.observes_layout:
             left = 1.0 - len(self._numbers) / self.slots.size
             stands = self.slots.encode(self.problem, observation.mesh_last(now.layout))
             seen |= observation.of_layout(
@@ -487,7 +487,7 @@ class BarrierDesign(BarrierEnv):
     """
 
     name = "rigdda/BarrierDesign-v0"
-    looks = False
+    observes_layout = False
 
     @classmethod
     def width_of(cls, slots: Slots) -> int:
@@ -541,7 +541,7 @@ class BarrierPlacement(BarrierEnv):
     """
 
     name = "rigdda/BarrierPlacement-v0"
-    looks = True
+    observes_layout = True
 
     @classmethod
     def width_of(cls, slots: Slots) -> int:

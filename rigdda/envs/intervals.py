@@ -168,8 +168,8 @@ def student_interval(values: ArrayLike) -> Interval:
     return mean - half, mean + half
 
 
-def cost(values: ArrayLike, dear: ArrayLike, known: Known | None = None) -> Mean:
-    """Return the mean of costs that are small unless a release is `dear` (costly).
+def cost(values: ArrayLike, costly: ArrayLike, known: Known | None = None) -> Mean:
+    """Return the mean of costs that are small unless a release is `costly`.
 
     mean = c + p (d - c), where c and d are the mean costs of the cheap and of the costly releases
     and p is the share of the latter. p has a mid-P interval, c and d have Student's intervals.
@@ -178,13 +178,13 @@ def cost(values: ArrayLike, dear: ArrayLike, known: Known | None = None) -> Mean
     ----------
     values : (n,) array
         Cost of each release, at least 0.
-    dear : (n,) array of bool
+    costly : (n,) array of bool
         Whether the release did harm on the road or a barrier failed.
     known : Known, optional
         Prior knowledge of the cost of a costly release; its mean is used only if the sample has
         none.
     """
-    sample, which = np.asarray(values, dtype=np.float64), np.asarray(dear, dtype=bool)
+    sample, which = np.asarray(values, dtype=np.float64), np.asarray(costly, dtype=bool)
     if not len(sample):
         return Mean(math.nan, 0.0, math.inf)
     high, low = sample[which], sample[~which]

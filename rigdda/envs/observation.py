@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigdda import Fence, Layout, Outcome, Site
 from rigdda.barriers import Built, standing
 from rigdda.envs.cost import Evaluation
-from rigdda.envs.envelope import BINS, STATIONS, Envelope, envelope, largest, stations
+from rigdda.envs.envelope import DEPOSIT_BINS, ZONE_STATIONS, Envelope, envelope, largest, stations
 from rigdda.envs.outcome_cache import Memory
 from rigdda.envs.problem import DesignProblem
 
@@ -49,7 +49,7 @@ FIELDS: dict[str, Field] = {
         2, 0.3, 1.0,
         "log10 of the distance from the start and from the end of the barrier zone to the road [m]",
     ),
-    "incline": Field(STATIONS, 0.6, 0.5, "inclination of the ground across the zone [rad]"),
+    "incline": Field(ZONE_STATIONS, 0.6, 0.5, "inclination of the ground across the zone [rad]"),
     "ground": Field(
         4, 0.45, 0.2,
         "tan of the friction angle and restitution at the start and at the end of the zone",
@@ -63,18 +63,20 @@ FIELDS: dict[str, Field] = {
         "[1/year per 100 m]",
     ),
     "often": Field(
-        2 * STATIONS, -0.2, 0.6,
+        2 * ZONE_STATIONS, -0.2, 0.6,
         "rate at which single blocks, then groups, pass the stations: "
         "log10(0.001 + rate in 1/year per 100 m)",
     ),
     "energy": Field(
-        2 * STATIONS, 5.4, 0.9, "95 % quantile of the energy of passing blocks: log10(1 + E / J)"
+        2 * ZONE_STATIONS, 5.4, 0.9,
+        "95 % quantile of the energy of passing blocks: log10(1 + E / J)",
     ),
     "bounce": Field(
-        2 * STATIONS, 0.8, 0.4, "95 % quantile of the height of their centroids: log10(0.1 + h / m)"
+        2 * ZONE_STATIONS, 0.8, 0.4,
+        "95 % quantile of the height of their centroids: log10(0.1 + h / m)",
     ),
     "deposit": Field(
-        BINS + 2, 0.2, 0.2,
+        DEPOSIT_BINS + 2, 0.2, 0.2,
         "square root of the share of the annual rock volume that comes to rest uphill of the zone, "
         "in equal bins from its start to the downhill edge of the road, and beyond",
     ),
@@ -127,9 +129,9 @@ memory: Memory[bytes, Arrays] = Memory(4096)
 """Site observations by site, about 2 kB each."""
 
 
-def space(size: int, slots: int, looks: bool) -> spaces.Dict:
+def space(size: int, slots: int, with_layout: bool) -> spaces.Dict:
     """Return the observation space for `slots` slots whose layout vector has `size` entries."""
-    fields = FIELDS | LAYOUT_FIELDS if looks else FIELDS
+    fields = FIELDS | LAYOUT_FIELDS if with_layout else FIELDS
     sizes = {0: size, -1: slots}
     bounds = {name: 1.0 if name == "layout" else BOUND for name in fields}
     return spaces.Dict(

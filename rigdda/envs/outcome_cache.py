@@ -39,17 +39,17 @@ K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 
 
-TEXTS = ("name", "description", "family")
+DESCRIPTIVE_FIELDS = ("name", "description", "family")
 """Fields of a site that only describe it."""
 
 
 def fingerprint(site: Site) -> bytes:
-    """Return a key of a site: the hash of everything but its `TEXTS`; numbers are exact."""
-    return _hashed(site, TEXTS, ())
+    """Return a key of a site: the hash of all but its `DESCRIPTIVE_FIELDS`; numbers are exact."""
+    return _hashed(site, DESCRIPTIVE_FIELDS, ())
 
 
 NO_MOTION = (
-    *TEXTS,
+    *DESCRIPTIVE_FIELDS,
     "origin",
     "prices",
     "consequences",
@@ -160,10 +160,10 @@ class Sample(tuple[Outcome, ...]):
         return [Sample(outcomes, ran, each * sum(ran)) for outcomes, ran in parts]
 
 
-MARGIN = 0.1
+CONTACT_MARGIN = 0.1
 """Distance from a barrier beyond which a block at the end of a step cannot touch it [m]."""
 
-LARGEST = 1.5
+LARGEST_RADIUS = 1.5
 """Upper bound of the radius of a block divided by the square root of its area [-]."""
 
 UNIT = 1.0
@@ -260,7 +260,7 @@ def _holds(site: Site, barrier: BarrierReach, without: Outcome) -> bool | None:
         return None  # the block may lie in a pit
     if not site.friction_varies and (over <= 0.0).all():
         return False
-    radius = LARGEST * math.sqrt(without.released_volume / without.width)
+    radius = LARGEST_RADIUS * math.sqrt(without.released_volume / without.width)
     if not site.friction_varies and alone and over[0] > 2.0 * radius:
         return True
     return None
@@ -300,7 +300,9 @@ def _stands(site: Site, barrier: Built, moved: np.ndarray | None, bears: float) 
     # half of the distance that a corner moves in a step if the block has the full energy of a fall
     # from the top of the slope: its speed is at most twice the speed of the fall
     drop = float(np.ptp(site.profile.points[:, 1]))
-    near = MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop) + REACH * site.pit_spacing
+    near = (
+        CONTACT_MARGIN + site.motion.dt * math.sqrt(2.0 * EARTH * drop) + REACH * site.pit_spacing
+    )
     return BarrierReach(start - near, end + near, face, top, bears)
 
 

@@ -129,7 +129,7 @@ CHECKS = ("reported", "required")
 
 FIDELITIES = ("fast", "full")
 
-COARSER = 1.5
+FAST_AREA_FACTOR = 1.5
 """Factor by which the mean area of blocks cut by joints is increased at fidelity "fast", so that
 there are two thirds as many blocks. A factor of 2 would increase the debris on `quick` by 5 % of
 the released mass."""
@@ -154,7 +154,7 @@ def site_at_fidelity(site: Site, fidelity: str) -> Site:
         return site
     replace, motion = msgspec.structs.replace, site.motion
     sources = tuple(
-        replace(s, block_area=min(COARSER * s.mean_block_area, s.area)) if s.polygon else s
+        replace(s, block_area=min(FAST_AREA_FACTOR * s.mean_block_area, s.area)) if s.polygon else s
         for s in site.sources
     )
     return replace(site, sources=sources, motion=replace(motion, dt=max(motion.dt, FAST_DT)))
@@ -204,8 +204,8 @@ def checked_kinds(site: Site, kinds: Sequence[str] | None) -> tuple[str, ...]:
     if "mesh" in names and not site.meshes:
         raise BadInput("kinds", kinds, f"leave mesh out: {site.name} has no options of it")
     if "removal" in names and not site.removals:
-        mend = f"leave removal out: {site.name} has no existing barrier with removable = true"
-        raise BadInput("kinds", kinds, mend)
+        hint = f"leave removal out: {site.name} has no existing barrier with removable = true"
+        raise BadInput("kinds", kinds, hint)
     return names
 
 
@@ -222,8 +222,8 @@ def read_targets(targets: Targets | Mapping[str, float | None] | None) -> Target
     if isinstance(targets, Targets):
         return targets
     if not isinstance(targets, Mapping) or not set(targets) <= {"reach", "failure", "individual"}:
-        mend = "give rigdda.envs.Targets(reach=..., failure=..., individual=...), or a mapping"
-        raise BadInput("targets", targets, mend)
+        hint = "give rigdda.envs.Targets(reach=..., failure=..., individual=...), or a mapping"
+        raise BadInput("targets", targets, hint)
     return Targets(**targets)
 
 
@@ -231,8 +231,8 @@ def checked_targets(site: Site, given: Targets | Mapping[str, float | None] | No
     """Return the validated targets on a site; none by default."""
     targets = read_targets(given)
     if targets.individual is not None and site.traffic is None:
-        mend = f"add the table [traffic] to site {site.name}, for the risk to life"
-        raise BadInput("targets.individual", targets.individual, mend)
+        hint = f"add the table [traffic] to site {site.name}, for the risk to life"
+        raise BadInput("targets.individual", targets.individual, hint)
     design = targets.reach is not None or targets.failure is not None
     if design and not any(event.design for event in site.events):
         raise BadInput("targets", targets, f"mark an event of {site.name} with design = true")

@@ -162,8 +162,8 @@ def _check_room(folder: Path) -> None:
         there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
         tempfile.TemporaryDirectory(dir=there).cleanup()
     except OSError as error:
-        mend = f"name a folder that can be created and written into ({error.strerror})"
-        raise BadInput("record", str(folder), mend) from None
+        hint = f"name a folder that can be created and written into ({error.strerror})"
+        raise BadInput("record", str(folder), hint) from None
 
 
 def _words(now: Evaluation) -> str:

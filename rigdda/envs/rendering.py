@@ -29,7 +29,7 @@ SIZE = (8.0, 4.5)
 PROPORTION = 2.0
 """Aspect ratio of the plotted area: the image without its title and axis labels."""
 
-CUT, BROKEN = "#dbe7f3", "#d62846"
+CUT, FAILED = "#dbe7f3", "#d62846"
 """Colours of the inside of a ditch and of failed barriers."""
 
 MATERIALS = {
@@ -44,7 +44,7 @@ MATERIALS = {
 }
 """Colours of surfaces by their ground of the library."""
 
-OTHERS = (GROUND, "#b9c4a4", "#d8b9a0", "#a9b7c0", "#cfc0d6")
+OTHER_COLOURS = (GROUND, "#b9c4a4", "#d8b9a0", "#a9b7c0", "#cfc0d6")
 """Colours of surfaces without a ground of the library, in turn."""
 
 STRETCH = 0.3
@@ -59,7 +59,7 @@ DASHED = (0.0, (1.2, 0.6))
 BAND = 0.02
 """Thickness of the band that represents mesh, as a share of the height of the image."""
 
-GAP = 16.0
+LABEL_GAP = 16.0
 """Distance of a label from the top of its barrier [points]."""
 
 
@@ -104,7 +104,7 @@ def draw(
     for i, barrier in enumerate(run.scene.barriers):
         worn = barrier.x in {one.x for one in old}
         stands = run.state(i, frame) == STANDS
-        colour = BROKEN if not stands else OLD if worn else BARRIER
+        colour = FAILED if not stands else OLD if worn else BARRIER
         start = run.outline(i, 0)
         foot = float(start[:, 0].mean()), float(start[:, 1].max()) - barrier.left_height(0.0)
         draw_barrier(axes, barrier, run.outline(i, frame), foot, colour, worn)
@@ -121,8 +121,12 @@ def materials(site: Site) -> dict[str, str]:
     out: dict[str, str] = {}
     for name in dict.fromkeys(site.profile.surfaces):
         library = site.surfaces[name].ground if name in site.surfaces else None
-        taken = sum(colour in OTHERS for colour in out.values())
-        out[name] = MATERIALS[library] if library in MATERIALS else OTHERS[taken % len(OTHERS)]
+        taken = sum(colour in OTHER_COLOURS for colour in out.values())
+        out[name] = (
+            MATERIALS[library]
+            if library in MATERIALS
+            else OTHER_COLOURS[taken % len(OTHER_COLOURS)]
+        )
     return out
 
 
@@ -262,7 +266,7 @@ def _write_labels(axes: Axes, labels: Sequence[Label], point: float) -> None:
         box = measured.get_window_extent()
         measured.remove()
         left = max(min(x, frame.x1 - box.width), frame.x0)
-        bottom = min(_free(taken, left, box, y + GAP * point), frame.y1 - box.height)
+        bottom = min(_free(taken, left, box, y + LABEL_GAP * point), frame.y1 - box.height)
         begins = min(max((x - left) / box.width, 0.0), 1.0)  # where the leader line meets the label
         axes.annotate(
             label.words,
@@ -323,7 +327,7 @@ def picture(run: Run, site: Site, layout: Layout, title: str) -> NDArray[np.uint
             colour = OLD if words.startswith("existing") else BARRIER
             labels.append(Label(words, top_point, colour))
         else:
-            labels.append(Label(f"{words}: {state}", top_point, BROKEN))
+            labels.append(Label(f"{words}: {state}", top_point, FAILED))
     for mesh in layout:
         if isinstance(mesh, Mesh):
             labels.append(Label(mesh.label, draw_mesh(axes, site, mesh, BAND * (top - bottom))))

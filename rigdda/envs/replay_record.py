@@ -138,5 +138,5 @@ def load(path: str | os.PathLike[str]) -> EpisodeRecord | ReleaseRecord:
     try:
         return msgspec.json.decode(read_record(path), type=EpisodeRecord | ReleaseRecord)
     except msgspec.MsgspecError as error:
-        mend = f"name one that this version of rigdda recorded ({error})"
-        raise BadInput("replay file", str(path), mend) from None
+        hint = f"name one that this version of rigdda recorded ({error})"
+        raise BadInput("replay file", str(path), hint) from None

@@ -27,13 +27,13 @@ CHART = {
 """Width and depth of a ditch [m] by inclination of the cut [deg], for cuts up to 10, 20 and 30 m
 high and for higher ones."""
 
-STEPS = (10.0, 20.0, 30.0)
+COLUMN_HEIGHTS = (10.0, 20.0, 30.0)
 """Heights up to which the columns of the chart apply [m]."""
 
 INCLINATIONS = (40.0, 90.0)
 """Inclinations for which the chart applies [deg]: half the distance of two rows beyond its ends."""
 
-HEIGHTS = (5.0, 40.0)
+CHART_HEIGHTS = (5.0, 40.0)
 """Heights of cuts for which the chart applies [m]. Ritchie's tests reached about 40 m."""
 
 
@@ -65,7 +65,7 @@ class RitchieDitch(NamedTuple):
         crest = above[above[:, 1] >= above[:, 1].max() - 0.1 * rise][-1]  # the crest of the cut
         steep = math.degrees(math.atan2(rise, max(toe - crest[0], 1e-3)))
         row = CHART[min(CHART, key=lambda angle: abs(angle - steep))]
-        width, depth = row[int(np.searchsorted(STEPS, rise))]
+        width, depth = row[int(np.searchsorted(COLUMN_HEIGHTS, rise))]
         return cls(float(rise), steep, width, depth)
 
     @property
@@ -74,7 +74,7 @@ class RitchieDitch(NamedTuple):
         words = []
         if not INCLINATIONS[0] <= self.inclination <= INCLINATIONS[1]:
             words.append(f"inclination {self.inclination:.0f} deg")
-        if not HEIGHTS[0] <= self.height <= HEIGHTS[1]:
+        if not CHART_HEIGHTS[0] <= self.height <= CHART_HEIGHTS[1]:
             words.append(f"height {self.height:.0f} m")
         return f"outside the range of the chart: {', '.join(words)}" if words else ""
 

@@ -31,8 +31,8 @@ class Bridge(VecEnv):
 
     def __init__(self, batch: BarrierVector):
         if batch.mode is not AutoresetMode.SAME_STEP:
-            mend = f"give {AutoresetMode.SAME_STEP.value}, which Stable-Baselines3 needs"
-            raise BadInput("autoreset_mode", batch.mode.value, mend)
+            hint = f"give {AutoresetMode.SAME_STEP.value}, which Stable-Baselines3 needs"
+            raise BadInput("autoreset_mode", batch.mode.value, hint)
         self.batch = batch
         self.render_mode = batch.render_mode
         super().__init__(batch.num_envs, batch.single_observation_space, batch.single_action_space)

@@ -15,7 +15,7 @@ import numpy as np
 
 from rigdda import BadInput, Barrier, Layout, Site, check, sites
 from rigdda.barriers import KINDS as ALL
-from rigdda.envs.encoding import NUMBERS, Floats, built_and_dropped, encode, slot_size
+from rigdda.envs.encoding import SLOT_NUMBERS, Floats, built_and_dropped, encode, slot_size
 from rigdda.envs.problem import (
     CHECKS,
     FIDELITIES,
@@ -32,7 +32,7 @@ Place = str | os.PathLike[str] | Site
 Places = Place | Sequence[Place]
 """A place, or a sequence of sites."""
 
-RANDOM = "random"
+RANDOM_ALIAS = "random"
 """Alias of the split "train"."""
 
 SPLITS = ("train", "validation", "test")
@@ -48,7 +48,7 @@ MESH = "mesh"
 REMOVAL = "removal"
 """The kind that only sites with removable barriers offer."""
 
-KINDS = (*USUAL, MESH)
+SAMPLED_KINDS = (*USUAL, MESH)
 """Default kinds of barrier if every episode draws its site."""
 
 
@@ -108,8 +108,8 @@ class Slots:
 
     def _columns(self, kinds: Sequence[str]) -> list[int]:
         """Return the columns of a slot that a problem with these kinds uses."""
-        scores = [NUMBERS + self.kinds.index(kind) for kind in kinds]
-        return [*range(NUMBERS), *(scores if len(kinds) > 1 else [])]
+        scores = [SLOT_NUMBERS + self.kinds.index(kind) for kind in kinds]
+        return [*range(SLOT_NUMBERS), *(scores if len(kinds) > 1 else [])]
 
 
 def named(kinds: Sequence[str]) -> tuple[str, ...]:
@@ -143,8 +143,8 @@ def drawn_from(site: Places) -> tuple[Place, ...]:
     BadInput
         If it is none of these.
     """
-    if isinstance(site, str) and site in (RANDOM, *SPLITS):
-        return _split("train" if site == RANDOM else site)
+    if isinstance(site, str) and site in (RANDOM_ALIAS, *SPLITS):
+        return _split("train" if site == RANDOM_ALIAS else site)
     if isinstance(site, str | os.PathLike | Site):
         return ()
     if not isinstance(site, Sequence) or not site:
@@ -230,7 +230,7 @@ class EpisodeSites:
         self.home: DesignProblem | None = None
         self._drawn = drawn_from(site)
         if self._drawn:
-            self.slots = Slots(named(KINDS if kinds is None else kinds), max_barriers)
+            self.slots = Slots(named(SAMPLED_KINDS if kinds is None else kinds), max_barriers)
             self.first = self.problem_of(self._drawn[0])
             if not isinstance(site, str):
                 self._check(self._drawn[1:])
@@ -254,7 +254,7 @@ class EpisodeSites:
             try:
                 self.problem_of(place)
             except BadInput as bad:
-                raise BadInput(f"site[{i}].{bad.field}", bad.value, bad.mend) from None
+                raise BadInput(f"site[{i}].{bad.field}", bad.value, bad.hint) from None
 
     def change(self, site: Places) -> None:
         """Change the site, split or sequence from the next episode on."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rigdda import BadInput, Barrier, GravityWall, Layout, Mesh, Site, check
 from rigdda.barriers import KINDS, Earthwork, Removal, as_layout, earthworks
-from rigdda.barriers.base import MIN_GAP, TOLERANCE, Span, meet, occupied
+from rigdda.barriers.base import LIMIT_ROUNDING, MIN_GAP, Span, meet, occupied
 from rigdda.envs import design_envelope
 from rigdda.envs.barrier_formulas import BarrierCheck, checks_of
 from rigdda.envs.design_envelope import DesignEnvelope
@@ -34,8 +34,8 @@ def narrow_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> Iterator[BadInput
     ordered = sorted(rooms, key=lambda item: item[2])
     for (_, before, one), (where, barrier, two) in pairwise(ordered):
         if meet(one, two):
-            mend = f"give at least {one[1] + MIN_GAP:g}: {MIN_GAP:g} m clear of the {before.words}"
-            yield BadInput(f"{where}.x", barrier.x, mend)
+            hint = f"give at least {one[1] + MIN_GAP:g}: {MIN_GAP:g} m clear of the {before.words}"
+            yield BadInput(f"{where}.x", barrier.x, hint)
 
 
 Floats = NDArray[np.float64]
@@ -89,8 +89,8 @@ class Rules:
         cut = [(max(low, zone.start), min(high, zone.end)) for low, high in site.rooms]
         self.parts = [(low, high) for low, high in cut if low < high]
         if not self.parts:
-            mend = f"overlap one of {site.rooms}, which are free of loose rock"
-            raise BadInput("zone", (zone.start, zone.end), mend)
+            hint = f"overlap one of {site.rooms}, which are free of loose rock"
+            raise BadInput("zone", (zone.start, zone.end), hint)
         old = zip(site.existing, site.existing_barriers, strict=True)
         self.fixed = [(b.words, occupied(b, self.works(b))) for e, b in old if not e.removable]
         self._x, self._y = site.profile.points.T
@@ -101,7 +101,7 @@ class Rules:
         """Return the maximal stretches of ground that are at most `steepest` steep [deg]."""
         rise, run = np.abs(np.diff(self._y)), np.diff(self._x)
         found: list[Span] = []
-        for k in np.flatnonzero(rise <= run * math.tan(math.radians(steepest)) + TOLERANCE):
+        for k in np.flatnonzero(rise <= run * math.tan(math.radians(steepest)) + LIMIT_ROUNDING):
             low, high = float(self._x[k]), float(self._x[k + 1])
             if found and found[-1][1] == low:
                 low = found.pop()[0]
@@ -180,7 +180,7 @@ class Rules:
             cost = self.site.capital(layout)
         except BadInput:
             return None
-        if cost <= self.max_cost * (1.0 + TOLERANCE):
+        if cost <= self.max_cost * (1.0 + LIMIT_ROUNDING):
             return None
         return f"{cost:,.0f} EUR/m", f"spend at most max_cost = {self.max_cost:,.0f} EUR/m"
 
@@ -209,11 +209,11 @@ class Rules:
         """Yield an error for each barrier that stands already, may not be removed and is close."""
         for words, taken in self.fixed:
             if meet(span, taken):
-                mend = (
+                hint = (
                     f"keep it, with its elongation up to {span[1]:g}, {MIN_GAP:g} m clear of the "
                     f"existing {words} at {taken[0]:g} to {taken[1]:g}"
                 )
-                yield BadInput(f"{where}.x", barrier.x, mend)
+                yield BadInput(f"{where}.x", barrier.x, hint)
 
     def check(self, where: str, barrier: Barrier) -> Span:
         """Return the works of a barrier after checking that it is feasible where it stands.
@@ -248,7 +248,7 @@ class Rules:
             try:
                 earthworks(self.site.profile, (barrier,), self.site.soil)
             except BadInput as bad:
-                yield BadInput(f"{where}: {bad.field}", bad.value, bad.mend)
+                yield BadInput(f"{where}: {bad.field}", bad.value, bad.hint)
                 return None
         if self.checks == "required":
             yield from self._failed_checks(where, barrier)
@@ -264,11 +264,11 @@ class Rules:
             self._failed[barrier] = next((c for c in found if not c.satisfied), None)
         failed = self._failed[barrier]
         if failed is not None:
-            mend = (
+            hint = (
                 f"satisfy the check of {failed.check}, {failed.demand:.4g} of "
                 f"{failed.capacity:.4g} {failed.unit}, or report the checks only"
             )
-            yield BadInput(where, barrier.label, mend)
+            yield BadInput(where, barrier.label, hint)
 
     @cached_property
     def _envelope(self) -> DesignEnvelope:
@@ -285,22 +285,22 @@ class Rules:
             angle, most = self.inclination(start, end), steepest
             if isinstance(barrier, GravityWall):
                 angle, most = self.foundation(start, end, steepest)
-            if angle > most + TOLERANCE:
-                mend = f"put it where the ground is at most {most:g} deg steep, not {angle:.1f}"
-                yield BadInput(f"{where}.x", barrier.x, mend)
+            if angle > most + LIMIT_ROUNDING:
+                hint = f"put it where the ground is at most {most:g} deg steep, not {angle:.1f}"
+                yield BadInput(f"{where}.x", barrier.x, hint)
             beside = float(self.beside(np.array([start]), np.array([end]), steepest)[0])
-            if beside < MACHINE - TOLERANCE:
-                mend = f"put it where a machine has {MACHINE:g} m beside it, not {beside:.1f}"
-                yield BadInput(f"{where}.x", barrier.x, mend)
+            if beside < MACHINE - LIMIT_ROUNDING:
+                hint = f"put it where a machine has {MACHINE:g} m beside it, not {beside:.1f}"
+                yield BadInput(f"{where}.x", barrier.x, hint)
 
     def _wrong_sizes(self, where: str, barrier: Barrier) -> Iterator[BadInput]:
         """Yield an error for each size that is out of range, and for an unsuitable design."""
         for length in barrier.lengths:
             value, (low, high) = getattr(barrier, length.field), length.limits(self.zone)
-            slack = TOLERANCE * max(1.0, high)
+            slack = LIMIT_ROUNDING * max(1.0, high)
             if not low - slack <= value <= high + slack:
-                mend = f"give a number of at least {low:g} and at most {high:g}"
-                yield BadInput(f"{where}.{length.field}", value, mend)
+                hint = f"give a number of at least {low:g} and at most {high:g}"
+                yield BadInput(f"{where}.{length.field}", value, hint)
         try:
             barrier.check_design(where, self.site)
         except BadInput as bad:
@@ -310,17 +310,17 @@ class Rules:
         self, where: str, barrier: Barrier, start: float, end: float
     ) -> Iterator[BadInput]:
         """Yield errors if a barrier is outside the zone or too close to the road."""
-        slack = TOLERANCE * max(1.0, abs(self.zone.end))
+        slack = LIMIT_ROUNDING * max(1.0, abs(self.zone.end))
         if not any(low - slack <= start and end <= high + slack for low, high in self.parts):
             rooms = " or ".join(f"{low:g} to {high:g} m" for low, high in self.parts)
-            mend = f"keep all of it, up to {end:g} m, within {rooms}"
-            yield BadInput(f"{where}.x", barrier.x, mend)
+            hint = f"keep all of it, up to {end:g} m, within {rooms}"
+            yield BadInput(f"{where}.x", barrier.x, hint)
         road = self.site.road.start
         give = barrier.deflection
         if give > 0.0 and end + give > road + slack:
             most = road - give - barrier.extent
-            mend = f"give at most {most:g}: it deflects by up to {give:g} m"
-            yield BadInput(f"{where}.x", barrier.x, f"{mend}, and the road begins at {road:g}")
+            hint = f"give at most {most:g}: it deflects by up to {give:g} m"
+            yield BadInput(f"{where}.x", barrier.x, f"{hint}, and the road begins at {road:g}")
 
     def inclination(self, start: float, end: float) -> float:
         """Return the mean inclination of the ground between two chainages [deg]."""
@@ -342,7 +342,7 @@ class Rules:
         return steepest, min(most, friction)
 
 
-STEP = 0.25
+PLACE_SPACING = 0.25
 """Spacing of the candidate places for a barrier that is not feasible where it should stand [m]."""
 
 NEAR_ZERO = 1e-3
@@ -383,7 +383,7 @@ class FeasiblePlaces(Rules):
         Returns
         -------
         (Barrier, (start, end)) or None
-            None if no candidate place, spaced `STEP` apart, is feasible.
+            None if no candidate place, spaced `PLACE_SPACING` apart, is feasible.
         """
         taken = [*taken, *(span for _, span in self.fixed)]
         found = self._try(barrier, barrier.x, taken)
@@ -421,14 +421,17 @@ class FeasiblePlaces(Rules):
             return []
         edges = [x for pair in ends for x in pair] + self._x.tolist()
         edges += [x for low, high in taken for x in (low - MIN_GAP - give, high + MIN_GAP)]
-        x = np.concatenate([*(np.arange(low, high, STEP) for low, high in ends), edges])
+        x = np.concatenate([*(np.arange(low, high, PLACE_SPACING) for low, high in ends), edges])
         x = x[np.any([(x >= low) & (x <= high) for low, high in ends], axis=0)]
         steepest = barrier.steepest
         if steepest is not None:
             rise = np.abs(self.level(x) - self.level(x + length))
             x = x[rise <= length * math.tan(math.radians(steepest)) + NEAR_ZERO]
             if not barrier.has_sides:  # its works end where its side meets the ground
-                x = x[self.beside(x, x + length, steepest) >= MACHINE - TOLERANCE]
+                x = x[self.beside(x, x + length, steepest) >= MACHINE - LIMIT_ROUNDING]
         for low, high in taken:
-            x = x[(x >= high + MIN_GAP - TOLERANCE) | (x + give <= low - MIN_GAP + TOLERANCE)]
+            x = x[
+                (x >= high + MIN_GAP - LIMIT_ROUNDING)
+                | (x + give <= low - MIN_GAP + LIMIT_ROUNDING)
+            ]
         return x[np.argsort(np.abs(x - barrier.x), kind="stable")].tolist()

@@ -60,8 +60,8 @@ def reset_mask(options: Options, copies: int) -> tuple[NDArray[np.bool_] | None,
         return None, options
     chosen = np.asarray(options[MASK])
     if chosen.shape != (copies,) or chosen.dtype != np.bool_ or not chosen.any():
-        mend = f"give {copies} booleans, at least one of them True"
-        raise BadInput(MASK, options[MASK], mend)
+        hint = f"give {copies} booleans, at least one of them True"
+        raise BadInput(MASK, options[MASK], hint)
     return chosen, {name: value for name, value in options.items() if name != MASK}
 
 

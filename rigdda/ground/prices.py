@@ -21,10 +21,10 @@ ACCESS_HEIGHT = 60.0
 """Height above the road at which the surcharge for access is `Prices.access` times the price
 [m]."""
 
-MOST = 1e6
+MAXIMUM_PRICE = 1e6
 """Maximum price [EUR per m, m2 or m3]."""
 
-FENCES = {
+FENCE_PRICES = {
     "100": 150.0,
     "250": 200.0,
     "500": 250.0,
@@ -47,8 +47,8 @@ UPKEEP = {
 }
 
 
-Price = Annotated[float, about(ge=0.0, le=MOST)]
-EnergyClass = Annotated[str, about(choices=FENCES)]
+Price = Annotated[float, about(ge=0.0, le=MAXIMUM_PRICE)]
+EnergyClass = Annotated[str, about(choices=FENCE_PRICES)]
 Upkeep = Annotated[float, about(ge=0.0, le=0.5)]
 Protection = Annotated[str, about(choices=UPKEEP)]
 Life = Annotated[float, about(ge=1.0, le=1000.0)]
@@ -66,7 +66,7 @@ class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     fence: Annotated[
         dict[EnergyClass, Price], about("Price of a fence by its energy class in kJ.", "EUR/m2")
-    ] = msgspec.field(default_factory=lambda: dict(FENCES))
+    ] = msgspec.field(default_factory=lambda: dict(FENCE_PRICES))
     fence_base: Annotated[
         Price,
         about("Additional price of a fence per metre of road, for foundations.", "EUR/m"),

@@ -14,7 +14,7 @@ from rigdda.ground.grounds import GROUNDS
 _OPEN: Any = msgspec.UNSET
 """Default of the fields that a surface takes from its ground."""
 
-PLAIN = {
+WITHOUT_GROUND = {
     "friction_deg": 30.0,
     "restitution": 0.0,
     "rolling": 0.0,
@@ -146,7 +146,7 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         fields.check(self)
-        usual = GROUNDS[self.ground].values if self.ground else PLAIN
+        usual = GROUNDS[self.ground].values if self.ground else WITHOUT_GROUND
         for name, value in usual.items():
             if getattr(self, name) is msgspec.UNSET:
                 msgspec.structs.force_setattr(self, name, value)
@@ -242,5 +242,5 @@ def check_surface(where: str, surface: Surface) -> None:
     """
     angle = surface.friction_deg
     if 0.0 < angle < 1.0:
-        mend = f"give degrees, such as 30: {angle:g} looks like a tangent or radians"
-        raise BadInput(f"{where}.friction_deg", angle, mend)
+        hint = f"give degrees, such as 30: {angle:g} looks like a tangent or radians"
+        raise BadInput(f"{where}.friction_deg", angle, hint)

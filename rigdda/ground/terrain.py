@@ -139,14 +139,14 @@ STEEPEST = 5.0
 """Slope, rise over run, above which the ground has no pits [-]. Pits are vertical, so that they
 would hardly change a face of 80 degrees."""
 
-CLEAR = 0.25
+PIT_CLEARANCE = 0.25
 """Minimum distance of a pit from an interval without pits, relative to the spacing [-], which
 avoids steps at its ends."""
 
-SAME = 1e-3
+SAME_PLACE = 1e-3
 """Distance within which a corner of the ground replaces a pit, relative to the spacing [-]."""
 
-REACH = 1.0 + CLEAR
+REACH = 1.0 + PIT_CLEARANCE
 """Distance from an interval without pits within which that interval affects the ground, relative to
 the spacing [-]."""
 
@@ -210,7 +210,7 @@ class Roughness(msgspec.Struct, frozen=True):
         for i, name in enumerate(ground.surfaces):
             inner = np.zeros(0)
             if amplitude[i] > 0.0:
-                away = SAME * self.spacing
+                away = SAME_PLACE * self.spacing
                 inner = nodes[(nodes > x[i] + away) & (nodes < x[i + 1] - away)]
             at = np.concatenate([x[i : i + 1], inner])
             level = np.concatenate([y[i : i + 1], np.interp(inner, x[i : i + 2], y[i : i + 2])])
@@ -230,7 +230,7 @@ class Roughness(msgspec.Struct, frozen=True):
         rng = np.random.Generator(np.random.PCG64(self.seed))
         depths: NDArray[np.float64] = np.abs(rng.standard_normal(len(nodes)))
         for low, high in even:
-            clear = CLEAR * self.spacing
+            clear = PIT_CLEARANCE * self.spacing
             kept = (nodes < low - clear) | (nodes > high + clear)
             kept |= (depths == 0.0) & ((nodes < low) | (nodes > high))  # ends of another interval
             nodes, depths = nodes[kept], depths[kept]

@@ -211,8 +211,8 @@ class Corridor(msgspec.Struct, frozen=True):
 
     def __post_init__(self) -> None:
         if not 1 <= len(self.sections) <= MOST_SECTIONS:
-            mend = f"give 1 to {MOST_SECTIONS:,} sections"
-            raise BadInput("sections", len(self.sections), mend)
+            hint = f"give 1 to {MOST_SECTIONS:,} sections"
+            raise BadInput("sections", len(self.sections), hint)
         names = [section.name for section in self.sections]
         for name in names:
             if names.count(name) > 1:
@@ -238,8 +238,8 @@ class Corridor(msgspec.Struct, frozen=True):
         path = Path(source)
         if path.suffix != ".toml" and not is_file(path):
             if str(source) not in names():
-                mend = f"name a TOML file or one of {', '.join(names())}"
-                raise BadInput("corridor", str(source), mend)
+                hint = f"name a TOML file or one of {', '.join(names())}"
+                raise BadInput("corridor", str(source), hint)
             text = (FOLDER / f"{source}.toml").read_text(encoding="utf-8")
             return _corridor(fields.parse("corridor", str(source), text), Path())
         if not is_file(path):
@@ -308,8 +308,8 @@ def _corridor(data: dict[str, Any], folder: Path) -> Corridor:
     """Return the corridor of a parsed file; file names in it are relative to `folder`."""
     file = CorridorFile(**fields.checked(CorridorFile, data))
     if bool(file.table) == bool(file.sections):
-        mend = 'give either tables [[sections]] or table = "sections.csv"'
-        raise BadInput("sections", len(file.sections), mend)
+        hint = 'give either tables [[sections]] or table = "sections.csv"'
+        raise BadInput("sections", len(file.sections), hint)
     tables = _rows(folder / file.table) if file.table else file.sections
     sites: dict[str, Site] = {}
     sections = []
@@ -319,7 +319,7 @@ def _corridor(data: dict[str, Any], folder: Path) -> Corridor:
             try:
                 sites[table.site] = _priced(_site(table.site, folder), file)
             except BadInput as bad:
-                raise BadInput(f"{where}.{bad.field}", bad.value, bad.mend) from None
+                raise BadInput(f"{where}.{bad.field}", bad.value, bad.hint) from None
         name = table.name or table.site.removesuffix(".toml")
         site = sites[table.site]
         if file.traffic is not None:

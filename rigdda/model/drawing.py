@@ -46,23 +46,23 @@ def polyline(path: Path, layer: str | None = None) -> tuple[Floats, tuple[str, .
     """
     unit, found = _polylines(path)
     if not found:
-        mend = "draw the profile as one polyline in model space, and join lines into a polyline"
-        raise BadInput("--profile", str(path), mend)
+        hint = "draw the profile as one polyline in model space, and join lines into a polyline"
+        raise BadInput("--profile", str(path), hint)
     layers = [line.dxf.layer for line in found]
     if layer is not None:
         found = [line for line in found if line.dxf.layer == layer]
         if len(found) != 1:
             names = ", ".join(sorted(set(layers)))
-            mend = f"name a layer with one polyline; the drawing has polylines on {names}"
-            raise BadInput("--layer", layer, mend)
+            hint = f"name a layer with one polyline; the drawing has polylines on {names}"
+            raise BadInput("--layer", layer, hint)
     if len(found) > 1:
         names = ", ".join(sorted(set(layers)))
-        mend = f"name the layer of the profile by --layer; there are polylines on {names}"
-        raise BadInput("--profile", f"{len(found)} polylines", mend)
+        hint = f"name the layer of the profile by --layer; there are polylines on {names}"
+        raise BadInput("--profile", f"{len(found)} polylines", hint)
     if unit not in (0, 6):
         name = UNITS.get(unit, f"unit {unit}")
-        mend = "scale it to metres, or set its unit to metres if it is drawn in metres"
-        raise BadInput("--profile", f"a drawing in {name} ($INSUNITS = {unit})", mend)
+        hint = "scale it to metres, or set its unit to metres if it is drawn in metres"
+        raise BadInput("--profile", f"a drawing in {name} ($INSUNITS = {unit})", hint)
     notes = () if unit else ("the drawing names no unit ($INSUNITS): metres are assumed",)
     return _vertices(path, found[0]), notes
 
@@ -72,8 +72,8 @@ def _polylines(path: Path) -> tuple[int, list[Any]]:
     try:
         import ezdxf
     except ImportError:
-        mend = 'install ezdxf, pip install "rigdda[dxf]", or save the profile as CSV'
-        raise BadInput("--profile", str(path), mend) from None
+        hint = 'install ezdxf, pip install "rigdda[dxf]", or save the profile as CSV'
+        raise BadInput("--profile", str(path), hint) from None
     if not is_file(path):
         raise BadInput("--profile", str(path), "name a file to read (no such file)")
     try:
@@ -93,16 +93,16 @@ def _vertices(path: Path, line: Any) -> Floats:
     """Return the vertices of a polyline or spline."""
     corners = np.array(_corners(line), dtype=np.float64).reshape(-1, 3)
     if len(corners) < 2 or not np.isfinite(corners).all():
-        mend = "draw the profile as a polyline of at least two points with finite coordinates"
-        raise BadInput("--profile", str(path), mend)
+        hint = "draw the profile as a polyline of at least two points with finite coordinates"
+        raise BadInput("--profile", str(path), hint)
     x_range, y_range, z_range = np.ptp(corners, axis=0)
     if z_range < LEVEL:
         if abs(corners[0, 2]) > LEVEL:
-            mend = (
+            hint = (
                 "draw the profile with x as chainage and y as elevation, or with the elevation of "
                 "each vertex: this line is level, as one in plan"
             )
-            raise BadInput("--profile", f"a line at elevation {corners[0, 2]:g}", mend)
+            raise BadInput("--profile", f"a line at elevation {corners[0, 2]:g}", hint)
         return corners[:, :2]
     if y_range < LEVEL and x_range >= LEVEL:
         return corners[:, [0, 2]]

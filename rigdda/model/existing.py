@@ -30,14 +30,14 @@ from rigdda.errors import BadInput
 from rigdda.fields import about, documented
 from rigdda.ground.terrain import Terrain
 
-KINDS = ("fence", "ditch", "embankment", "gravity_wall", "wall")
+EXISTING_KINDS = ("fence", "ditch", "embankment", "gravity_wall", "wall")
 """Kinds that may stand already. Mesh is not among them, because the rates of events are those with
 it."""
 
 SIZES = ("height", "depth", "width", "thickness", "side_slope", "energy_class")
 """Sizes of barriers."""
 
-NEAR = 1e-6
+SAME_PLACE = 1e-6
 """Greatest distance between the chainages of a barrier and of its removal [m]."""
 
 Cost = Annotated[float, about(ge=0.0, le=1e6)]
@@ -60,7 +60,7 @@ class Existing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         If a value is of the wrong type or outside its range.
     """
 
-    kind: Annotated[str, about("Kind of barrier.", choices=KINDS)]
+    kind: Annotated[str, about("Kind of barrier.", choices=EXISTING_KINDS)]
     x: Annotated[float, about("Chainage of its uphill face or edge.", "m")]
     height: Annotated[
         Metres | None, about("Height today. Needed for all kinds except a ditch.", "m")
@@ -133,11 +133,11 @@ def _barrier(existing: Existing, where: str) -> Built:
     given = {name: value for name, value in table.items() if value is not None}
     if existing.kind == "fence":
         if existing.energy_class is None:
-            mend = "add the energy class that the fence had when it was new"
-            raise BadInput(f"{where}.energy_class", None, mend)
+            hint = "add the energy class that the fence had when it was new"
+            raise BadInput(f"{where}.energy_class", None, hint)
     elif existing.condition < 1.0:
-        mend = f"leave it out: give the sizes that the {existing.kind.replace('_', ' ')} has today"
-        raise BadInput(f"{where}.condition", existing.condition, mend)
+        hint = f"leave it out: give the sizes that the {existing.kind.replace('_', ' ')} has today"
+        raise BadInput(f"{where}.condition", existing.condition, hint)
     found = from_table(where, given)
     assert isinstance(found, Built)
     if isinstance(found, Fence) and existing.condition < 1.0:
@@ -176,25 +176,25 @@ def check_existing(
     for i, one in enumerate(existing):
         where = f"existing[{i}]"
         if one.removal is not None and not one.removable:
-            mend = "leave it out, or say removable = true"
-            raise BadInput(f"{where}.removal", one.removal, mend)
+            hint = "leave it out, or say removable = true"
+            raise BadInput(f"{where}.removal", one.removal, hint)
         barrier = _barrier(one, where)
         if not low <= barrier.x <= high:
-            mend = f"put it on the slope, at least {low:g} and at most {high:g}"
-            raise BadInput(f"{where}.x", barrier.x, mend)
+            hint = f"put it on the slope, at least {low:g} and at most {high:g}"
+            raise BadInput(f"{where}.x", barrier.x, hint)
         if barrier.end > road:
-            mend = f"put all of it, up to {barrier.end:g}, uphill of the road, which begins at"
-            raise BadInput(f"{where}.x", barrier.x, f"{mend} {road:g}")
+            hint = f"put all of it, up to {barrier.end:g}, uphill of the road, which begins at"
+            raise BadInput(f"{where}.x", barrier.x, f"{hint} {road:g}")
         try:
             if isinstance(barrier, Earthwork):
                 earthworks(ground, (barrier,), soil)
             works = barrier.works(ground)
         except BadInput as bad:
-            raise BadInput(f"{where}: {bad.field}", bad.value, bad.mend) from None
+            raise BadInput(f"{where}: {bad.field}", bad.value, bad.hint) from None
         for other, span in found:
             if works[0] < span[1] and span[0] < works[1]:
-                mend = f"it overlaps the existing {other.words} at {other.x:g}: correct one of them"
-                raise BadInput(f"{where}.x", barrier.x, mend)
+                hint = f"it overlaps the existing {other.words} at {other.x:g}: correct one of them"
+                raise BadInput(f"{where}.x", barrier.x, hint)
         found.append((barrier, works))
     return tuple(barrier for barrier, _ in found)
 
@@ -226,11 +226,13 @@ def _removed(existing: tuple[Existing, ...], at: int, removal: Barrier) -> list[
     """Return the index of the barrier that a removal names, if it is one."""
     if not isinstance(removal, Removal):
         return []
-    found = [i for i, e in enumerate(existing) if e.removable and abs(e.x - removal.x) <= NEAR]
+    found = [
+        i for i, e in enumerate(existing) if e.removable and abs(e.x - removal.x) <= SAME_PLACE
+    ]
     if not found:
         known = ", ".join(f"{one.x:g}" for one in existing if one.removable)
-        mend = f"give {known}" if known else "leave it out: the site has no removable barrier"
-        raise BadInput(f"barriers[{at}].x", removal.x, mend)
+        hint = f"give {known}" if known else "leave it out: the site has no removable barrier"
+        raise BadInput(f"barriers[{at}].x", removal.x, hint)
     return found
 
 
@@ -267,5 +269,5 @@ def _check_clear(barrier: Built, ground: Terrain, layout: Layout) -> None:
         if isinstance(other, Built):
             start, end = other.works(ground)
             if start < high and low < end:
-                mend = f"keep clear of the existing {barrier.words} at {low:g} to {high:g}"
-                raise BadInput(f"barriers[{i}].x", other.x, mend)
+                hint = f"keep clear of the existing {barrier.words} at {low:g} to {high:g}"
+                raise BadInput(f"barriers[{i}].x", other.x, hint)

@@ -36,7 +36,7 @@ FACTOR, EXPONENT = 38.7, 2.31
 CONIFER, BROADLEAVED = 0.93, 1.59
 """Mean fracture energy of conifers and of broadleaved trees relative to silver fir [-]."""
 
-LEAST, RISE, MIDDLE, STEEPNESS = -0.046, 1.026, 0.58, 8.007
+SHARE_LEAST, SHARE_RISE, SHARE_MIDDLE, SHARE_STEEPNESS = -0.046, 1.026, 0.58, 8.007
 """Constants of the share of the energy that is taken off the axis, see `share` [-]."""
 
 HECTARE = 1e4
@@ -94,8 +94,8 @@ class Forest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         fields.check(self, "forest: ")
         if self.end <= self.start:
-            mend = f"let it end beyond {self.start:g}, where it begins"
-            raise BadInput("forest: end", self.end, mend)
+            hint = f"let it end beyond {self.start:g}, where it begins"
+            raise BadInput("forest: end", self.end, hint)
 
     @property
     def basal_area(self) -> float:
@@ -132,7 +132,7 @@ def share(offset: Floats) -> Floats:
         over the radius of the stem [-]. That of a disc equals the distance of its path from the
         axis over the sum of the two radii.
     """
-    found = LEAST + RISE / (1.0 + 10.0 ** (STEEPNESS * (offset - MIDDLE)))
+    found = SHARE_LEAST + SHARE_RISE / (1.0 + 10.0 ** (SHARE_STEEPNESS * (offset - SHARE_MIDDLE)))
     return np.maximum(found, 0.0)
 
 

@@ -28,9 +28,9 @@ AREA_TOLERANCE = 0.05
 """Tolerated relative error of the mean block area. Joints are redrawn, with their spacings
 rescaled, until it is met."""
 
-DRAWS = 200
+MOST_DRAWS = 200
 
-NEAR = 1e-7
+EDGE_TOLERANCE = 1e-7
 """Distance within which a corner counts as on an edge, relative to the perimeter of the cell [-];
 allows for rounding."""
 
@@ -114,7 +114,7 @@ def cut(
         usual = min(spaced_area(joints), source.area)
         return _outlines(_join_bridges(_cells(source, joints, 1.0, rng), joints, usual, rng))
     scale = math.sqrt(block_area / math.prod(j.spacing for j in joints[:2]))
-    for _ in range(DRAWS):
+    for _ in range(MOST_DRAWS):
         cells = _join_bridges(_cells(source, joints, scale, rng), joints, block_area, rng)
         mean = source.area / len(cells)
         if abs(mean / block_area - 1.0) <= AREA_TOLERANCE:
@@ -238,7 +238,7 @@ def _join(
         return
     shapes = np.array([parts[j] for j in others])
     if not convex:  # merging may have removed a shared node from an edge
-        near = NEAR * cell.length
+        near = EDGE_TOLERANCE * cell.length
         cell = shapely.snap(cell, shapely.multipolygons(shapes), near)
         shapes = shapely.snap(shapes, cell, near)
     common = shapely.intersection(cell, shapes)
@@ -256,7 +256,7 @@ def _join(
             break
     else:
         return
-    parts[best], parts[i] = joined.simplify(NEAR * cell.length), None
+    parts[best], parts[i] = joined.simplify(EDGE_TOLERANCE * cell.length), None
     beside[best] = sorted({*beside[best], *beside[i]} - {best, i})
     for j in beside[i]:
         beside[j] = sorted({*beside[j], best} - {i, j})
@@ -268,7 +268,7 @@ def _union(cell: shapely.Polygon, other: shapely.Polygon) -> shapely.Polygon | N
     If a cell has lost a node of that edge, the edges nearly coincide, and GEOS 3.14 may return only
     one of the two cells. Restoring the nodes by snapping avoids this.
     """
-    area, near = cell.area + other.area, NEAR * cell.length
+    area, near = cell.area + other.area, EDGE_TOLERANCE * cell.length
     for _ in range(2):
         joined = shapely.union(cell, other)
         if abs(joined.area - area) <= FLAT * area:

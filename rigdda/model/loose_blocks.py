@@ -24,7 +24,7 @@ JITTER = 0.35
 """Maximum shift of a corner relative to the mean angle between corners [-]. With four corners the
 widest gap is 153 deg, so that the centre remains inside."""
 
-CLEAR = 0.01
+INITIAL_GAP = 0.01
 """Initial gap between a block and what it rests on [m], larger than rounding errors."""
 
 EVEN = 1e-9
@@ -35,7 +35,7 @@ AREA, CORNERS, ASPECT, TURN, PLACE, SPEED, SPIN = 0, 1, 2, 3, 4, 5, 6
 """Indices of the random numbers in [0, 1) of a block. For a measured block the first one selects
 the face, and the third one rotates the corners on it."""
 
-DRAWN = 7
+RANDOM_NUMBERS = 7
 """Number of these random numbers; those for the angles of the corners follow."""
 
 
@@ -86,7 +86,7 @@ def write_shapes(
         n = law.least_corners + int(u[CORNERS] * (law.most_corners - law.least_corners + 1))
         gap = 2.0 * math.pi / n
         for k in range(n):
-            corner[k, 0] = gap * (k + JITTER * (2.0 * u[DRAWN + k] - 1.0))
+            corner[k, 0] = gap * (k + JITTER * (2.0 * u[RANDOM_NUMBERS + k] - 1.0))
         double = math.sin(corner[0, 0] - corner[n - 1, 0])  # twice the area on a circle of radius 1
         for k in range(1, n):
             double += math.sin(corner[k, 0] - corner[k - 1, 0])
@@ -170,7 +170,7 @@ def lay_blocks(
         lift = _lift(mine, ground)
         for j in range(i):
             lift = max(lift, _lift_off(mine, corners[j, : count[j]]))
-        lift = CLEAR + lift
+        lift = INITIAL_GAP + lift
         for k in range(len(mine)):
             mine[k, 1] += lift
 
@@ -270,7 +270,7 @@ def logarithmic_shares(event: Event, shares: NDArray[np.float64]) -> NDArray[np.
     return at
 
 
-SPREAD = 1.1
+NEIGHBOUR_SPACING = 1.1
 """Spacing of neighbours in a group relative to their mean length [-]. Blocks that do not fit side
 by side in the band lie in a layer above."""
 
@@ -286,7 +286,7 @@ def draw(
     low, high = event.number
     count = low if low == high else low + int(rng.random() * (high - low + 1))
     most_corners = source.corners[1]
-    numbers = rng.random((count, DRAWN + most_corners))
+    numbers = rng.random((count, RANDOM_NUMBERS + most_corners))
     corners = np.empty((count, most_corners, 2))
     number, area = np.empty(count, dtype=np.int64), np.empty(count)
     least_area, greatest_area = event.area or (0.0, 0.0)
@@ -312,7 +312,7 @@ def draw(
     start, end = source.band
     row = 1  # number of blocks side by side
     if count > 1:
-        length = SPREAD * math.sqrt(sum(areas) / count * source.aspect[1])
+        length = NEIGHBOUR_SPACING * math.sqrt(sum(areas) / count * source.aspect[1])
         row = min(max(1, int((end - start) / length)), count)
     lay_blocks_directly.call(numbers, float(start), float(end), row, ground, corners, number)
     least, greatest = source.speed

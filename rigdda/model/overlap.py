@@ -18,7 +18,7 @@ from rigdda.geometry import overlap
 from rigdda.ground.terrain import Terrain
 from rigdda.kernel import Direct, short_kernel
 
-FEW = 16
+PAIRWISE_BLOCKS = 16
 """Number of blocks up to which bounding boxes are compared in pairs; a tree is faster for more."""
 
 MOST_SHARED = 0.01
@@ -49,7 +49,7 @@ def check_apart(outlines: Sequence[NDArray[np.float64]], fixed: Sequence[bool]) 
     BadInput
         If two blocks overlap by more than a hundredth of the smaller one.
     """
-    if len(outlines) <= FEW and all_beside(outlines):
+    if len(outlines) <= PAIRWISE_BLOCKS and all_beside(outlines):
         return
     polygons = shapely.polygons([shapely.linearrings(corners) for corners in outlines])
     area = shapely.area(polygons)

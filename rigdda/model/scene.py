@@ -139,8 +139,8 @@ def check_capacities(barriers: Sequence[Barrier]) -> None:
     """
     for i, barrier in enumerate(barriers):
         if isinstance(barrier, Fence) and barrier.capacity is None:
-            mend = "give fence.for_width(width): a scene needs the capacity per metre"
-            raise BadInput(f"barriers[{i}].energy_class", barrier.energy_class, mend)
+            hint = "give fence.for_width(width): a scene needs the capacity per metre"
+            raise BadInput(f"barriers[{i}].energy_class", barrier.energy_class, hint)
 
 
 def check_blocks(blocks: Sequence[Block]) -> None:
@@ -168,14 +168,14 @@ def check_clear(scene: Scene, ground: Terrain) -> None:
     found = in_ground(ground, list(free.values()))
     if found is not None:
         i = list(free)[found.block]
-        mend = f"raise it: it overlaps the ground by {found.shared:.3g} m2"
-        raise BadInput(f"blocks[{i}]", scene.blocks[i].vertices.tolist(), mend)
+        hint = f"raise it: it overlaps the ground by {found.shared:.3g} m2"
+        raise BadInput(f"blocks[{i}]", scene.blocks[i].vertices.tolist(), hint)
     for j in scene.bodies:
         found = deepest(scene.outline(j), list(free.values()))
         if found is not None:
             i = list(free)[found.block]
-            mend = f"move it: it overlaps block {i} by {found.shared:.3g} m2"
-            raise BadInput(f"barriers[{j}].x", scene.barriers[j].x, mend)
+            hint = f"move it: it overlaps block {i} by {found.shared:.3g} m2"
+            raise BadInput(f"barriers[{j}].x", scene.barriers[j].x, hint)
 
 
 def checked_stems(
@@ -200,8 +200,8 @@ def checked_stems(
     for i, rows in enumerate(stems):
         table = np.array(rows, dtype=np.float64).reshape(-1, 3)
         for row in table[~((table >= (low, 0.0, 0.0)) & (table <= (high, np.inf, np.inf))).all(1)]:
-            mend = f"give a chainage from {low:g} to {high:g} m, and an energy and a height >= 0"
-            raise BadInput(f"stems[{i}]", row.tolist(), mend)
+            hint = f"give a chainage from {low:g} to {high:g} m, and an energy and a height >= 0"
+            raise BadInput(f"stems[{i}]", row.tolist(), hint)
         found.append(table[np.argsort(table[:, 0], kind="stable")])
     return tuple(found)
 
@@ -218,8 +218,8 @@ def check_order(scene: Scene) -> None:
     for i, j in pairwise(upright):
         end = scene.barriers[i].end
         if scene.barriers[j].x < end - 1e-9 * max(1.0, abs(end)):
-            mend = f"put it downhill of x = {end:g}, where barriers[{i}] ends"
-            raise BadInput(f"barriers[{j}].x", scene.barriers[j].x, mend)
+            hint = f"put it downhill of x = {end:g}, where barriers[{i}] ends"
+            raise BadInput(f"barriers[{j}].x", scene.barriers[j].x, hint)
 
 
 __all__ = ["Barrier", "Block", "Scene", "Surface", "Terrain", "Wall"]

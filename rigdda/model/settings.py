@@ -144,8 +144,8 @@ def check_damping(damping: float, when: str, prefix: str = "") -> None:
         If it is to act in contact only; `prefix` precedes the name of the field.
     """
     if damping > 0.0 and when == "contact":
-        mend = (
+        hint = (
             "damping in contact was replaced by rolling resistance: leave out the damping and give "
             '`rolling` to the surfaces, or use "always"'
         )
-        raise BadInput(f"{prefix}damping_when", when, mend)
+        raise BadInput(f"{prefix}damping_when", when, hint)

@@ -44,7 +44,7 @@ from rigdda.model.site_tables import Drawn, Event, SiteTables
 from rigdda.model.soundness import check_site
 from rigdda.model.source import Source
 from rigdda.model.survey import SURVEYS
-from rigdda.model.traffic import Toll
+from rigdda.model.traffic import TrafficConsequences
 
 Value = TypeVar("Value")
 
@@ -82,8 +82,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             msgspec.structs.force_setattr(self, "events", usual)
         check_site(self)
         if not self.rooms:
-            mend = "leave room for barriers: bands of loose rock cover the whole zone"
-            raise BadInput("barrier_zone.end", self.barrier_zone.end, mend)
+            hint = "leave room for barriers: bands of loose rock cover the whole zone"
+            raise BadInput("barrier_zone.end", self.barrier_zone.end, hint)
         if self.existing:
             _check_existing(self)
 
@@ -100,8 +100,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             raise BadInput("site", source, "name a TOML file or a built-in site")
         path = Path(source)
         if path.suffix.lower() in SURVEYS:
-            mend = f"make a site file of this survey: rigdda new NAME --profile {source}"
-            raise BadInput("site", str(source), mend)
+            hint = f"make a site file of this survey: rigdda new NAME --profile {source}"
+            raise BadInput("site", str(source), hint)
         if path.suffix != ".toml" and not is_file(path):
             return cls.named(str(source))
         if not is_file(path):
@@ -164,11 +164,11 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
                     if table.get(name) == value:
                         del table[name]
                 if table.get("restitution_speed", 0.0) is None:
-                    mend = "give a number: a file without it means that of the ground"
-                    raise BadInput(f"{where}.restitution_speed", None, mend)
+                    hint = "give a number: a file without it means that of the ground"
+                    raise BadInput(f"{where}.restitution_speed", None, hint)
             if table.get("restitution", 0.0) is None:
-                mend = "give a number: None (plain contact) is possible in Python only"
-                raise BadInput(f"{where}.restitution", None, mend)
+                hint = "give a number: None (plain contact) is possible in Python only"
+                raise BadInput(f"{where}.restitution", None, hint)
             for name in ("rolling", "restitution_speed"):
                 if table.get(name, 0.0) is None:
                     del table[name]
@@ -263,8 +263,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
                 continue
             for low, high in taken:
                 if barrier.x < high - ROUNDING and barrier.x + barrier.extent > low + ROUNDING:
-                    mend = f"put it outside the loose rock at x = {low:.2f} to {high:.2f}"
-                    raise BadInput(f"barriers[{i}].x", barrier.x, mend)
+                    hint = f"put it outside the loose rock at x = {low:.2f} to {high:.2f}"
+                    raise BadInput(f"barriers[{i}].x", barrier.x, hint)
             found.append(barrier.for_width(width))
         return tuple(found)
 
@@ -494,7 +494,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         volume, reached = self.on_road(layout, outcome)
         harm = self.consequences.harm(volume, reached)
         if self.traffic is not None and self.traffic.fatality_value:
-            harm += float(self.traffic.price(self.toll(layout, outcome).fatalities))
+            harm += float(self.traffic.price(self.traffic_consequences(layout, outcome).fatalities))
         return Bill(harm, repair)
 
     def on_road(self, layout: Sequence[Barrier], outcome: Outcome) -> tuple[float, bool]:
@@ -508,7 +508,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
                     reached = reached or found.road_area > 0.0
         return volume, reached
 
-    def toll(self, layout: Sequence[Barrier], outcome: Outcome) -> Toll:
+    def traffic_consequences(
+        self, layout: Sequence[Barrier], outcome: Outcome
+    ) -> TrafficConsequences:
         """Return the expected consequences for the traffic of the rock of a release.
 
         A wall that was pushed onto the road does not count; its harm is part of `bill`.
@@ -523,7 +525,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         lies = outcome.debris_on_road > 0.0
         energy = outcome.max_energy_on_road * outcome.width
         width, volume = outcome.width, outcome.road_volume
-        return self.traffic.toll(outcome.reached, lies, width, volume, energy)
+        return self.traffic.consequences(outcome.reached, lies, width, volume, energy)
 
     def shed(self) -> float:
         """Return the annual cost of a rock shed over the road [EUR per metre of road and year].
@@ -675,7 +677,7 @@ def _check_existing(site: Site) -> None:
         except BadInput as bad:
             field = bad.field.replace("barriers[0]", f"existing[{i}]")
             field = field if field.startswith("existing") else f"existing[{i}]: {field}"
-            raise BadInput(field, bad.value, bad.mend) from None
+            raise BadInput(field, bad.value, bad.hint) from None
 
 
 def _taken(site: Site) -> list[tuple[float, float]]:

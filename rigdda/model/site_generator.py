@@ -28,11 +28,11 @@ S = TypeVar("S", bound=SiteTables)
 
 replace = msgspec.structs.replace
 
-FALLEN, SHARE = 10.0, 1.0 / 3.0
+LEAST_FALL, LEAST_FALL_SHARE = 10.0, 1.0 / 3.0
 """Barriers may stand where rock has fallen by this height [m], or by this share of the height to
 the toe."""
 
-MARGIN = 0.05
+ZONE_MARGIN = 0.05
 """Distance downhill of that point at which a zone begins [m]."""
 
 
@@ -132,7 +132,7 @@ def fallen(slope: Slope, sources: tuple[Source, ...]) -> float:
     tops = [float(np.interp(s.band[0], x, y)) for s in sources if s.band is not None]
     tops += [float(np.interp(min(s.polygon)[0], x, y)) for s in sources if s.polygon]
     top = max(tops)
-    level = top - min(FALLEN, SHARE * (top - float(np.interp(slope.toe, x, y))))
+    level = top - min(LEAST_FALL, LEAST_FALL_SHARE * (top - float(np.interp(slope.toe, x, y))))
     for (ax, ay), (bx, by) in pairwise(slope.points):
         if by <= level < ay:
             return ax + (bx - ax) * (ay - level) / (ay - by)
@@ -159,7 +159,7 @@ def _zone(
 ) -> BarrierZone:
     """Return the zone, moved with the ground and limited to where rock has fallen far enough."""
     zone = base.barrier_zone
-    start = max(ground.x(zone.start), fallen(slope, sources) + MARGIN)
+    start = max(ground.x(zone.start), fallen(slope, sources) + ZONE_MARGIN)
     return replace(zone, start=millimetres(start), end=ground.x(zone.end))
 
 

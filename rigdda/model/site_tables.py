@@ -76,16 +76,16 @@ class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         fields.check(self, "slope.")
-        last = -check.LARGEST
+        last = -check.LARGEST_NUMBER
         for i, stretch in enumerate(self.surfaces):
             where = f"slope.surfaces[{i}]"
             if stretch.start < last:
                 before = self.surfaces[i - 1].surface
-                mend = f"let {stretch.surface} begin at {last:g} or beyond, where {before} ends"
-                raise BadInput(f"{where}.start", stretch.start, mend)
+                hint = f"let {stretch.surface} begin at {last:g} or beyond, where {before} ends"
+                raise BadInput(f"{where}.start", stretch.start, hint)
             if stretch.end <= stretch.start:
-                mend = f"let {stretch.surface} end beyond {stretch.start:g}, where it begins"
-                raise BadInput(f"{where}.end", stretch.end, mend)
+                hint = f"let {stretch.surface} end beyond {stretch.start:g}, where it begins"
+                raise BadInput(f"{where}.end", stretch.end, hint)
             last = stretch.end
 
     def surface_at(self, x: float) -> str:
@@ -283,8 +283,8 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             _set(self, "area", (ends[0] ** VOLUME_EXPONENT, ends[1] ** VOLUME_EXPONENT))
         if self.volume is not None:
             if self.area is not None:
-                mend = "leave it out: the event gives its area, too"
-                raise BadInput(f"{self.words}.volume", list(self.volume), mend)
+                hint = "leave it out: the event gives its area, too"
+                raise BadInput(f"{self.words}.volume", list(self.volume), hint)
             low, high = (volume**VOLUME_EXPONENT for volume in self.volume)
             _set(self, "area", (low, high))
         for name in ("volume", "return_period", "section_length"):
@@ -294,10 +294,10 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Check that a distribution of volumes is complete and the only one."""
         where, lognormal = self.words, (self.volume_median, self.volume_spread)
         if self.volumes is not None or self.volume_shares is not None:
-            mend = "leave it out: the event gives volumes and volume_shares"
+            hint = "leave it out: the event gives volumes and volume_shares"
             for name in ("volume", "volume_median", "volume_spread"):
                 if getattr(self, name) is not None:
-                    raise BadInput(f"{where}.{name}", getattr(self, name), mend)
+                    raise BadInput(f"{where}.{name}", getattr(self, name), hint)
             volumes, shares = self.volumes or (), self.volume_shares or ()
             if len(volumes) < 2 or any(a >= b for a, b in pairwise(volumes)):
                 raise BadInput(f"{where}.volumes", volumes, "give at least two volumes, rising")
@@ -307,20 +307,20 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise BadInput(f"{where}.volume_shares", shares, told)
             ends = volumes[0] ** VOLUME_EXPONENT, volumes[-1] ** VOLUME_EXPONENT
             if self.area not in (None, ends):
-                raise BadInput(f"{where}.area", self.area, mend)
+                raise BadInput(f"{where}.area", self.area, hint)
         elif lognormal != (None, None):
             missing = "volume_spread" if self.volume_spread is None else "volume_median"
             if None in lognormal:
-                mend = "give both volume_median and volume_spread"
-                raise BadInput(f"{where}.{missing}", None, mend)
+                hint = "give both volume_median and volume_spread"
+                raise BadInput(f"{where}.{missing}", None, hint)
             limits = self.volume_limits
             if limits is None:
-                mend = "give the least and the greatest volume, to which lognormal volumes are cut"
-                raise BadInput(f"{where}.volume", None, mend)
+                hint = "give the least and the greatest volume, to which lognormal volumes are cut"
+                raise BadInput(f"{where}.volume", None, hint)
             assert self.volume_median is not None
             if not limits[0] <= self.volume_median <= limits[1]:
-                mend = f"give a median within the limits, {limits[0]:.3g} to {limits[1]:.3g} m3"
-                raise BadInput(f"{where}.volume_median", self.volume_median, mend)
+                hint = f"give a median within the limits, {limits[0]:.3g} to {limits[1]:.3g} m3"
+                raise BadInput(f"{where}.volume_median", self.volume_median, hint)
 
     @property
     def volume_limits(self) -> tuple[float, float] | None:
@@ -337,19 +337,19 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         period, length = self.return_period, self.section_length
         if period is None:
             if self.rate is _OPEN:
-                mend = "add how often it happens on 100 m of slope a year, or a return_period"
-                raise BadInput(f"{self.words}.rate", None, mend)
+                hint = "add how often it happens on 100 m of slope a year, or a return_period"
+                raise BadInput(f"{self.words}.rate", None, hint)
             if length is not None:
-                mend = "leave it out: it goes with a return_period, and the event gives a rate"
-                raise BadInput(f"{self.words}.section_length", length, mend)
+                hint = "leave it out: it goes with a return_period, and the event gives a rate"
+                raise BadInput(f"{self.words}.section_length", length, hint)
             return self.rate
         if self.rate is not _OPEN:
-            mend = "leave it out: the event gives its rate, too"
-            raise BadInput(f"{self.words}.return_period", period, mend)
+            hint = "leave it out: the event gives its rate, too"
+            raise BadInput(f"{self.words}.return_period", period, hint)
         rate = SECTION / (period * (length or SECTION))
         if rate > MOST_OFTEN:
-            mend = f"give years: this is {rate:g} events a year on 100 m, at most {MOST_OFTEN:g}"
-            raise BadInput(f"{self.words}.return_period", period, mend)
+            hint = f"give years: this is {rate:g} events a year on 100 m, at most {MOST_OFTEN:g}"
+            raise BadInput(f"{self.words}.return_period", period, hint)
         return rate
 
     @property
@@ -373,11 +373,11 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             If it is that of arrivals.
         """
         if self.rate_of != RELEASE:
-            mend = (
+            hint = (
                 "convert it to the rate of releases first: "
                 "site = rigdda.envs.with_release_rates(site)"
             )
-            raise BadInput(f"{self.words}.rate_of", self.rate_of, mend)
+            raise BadInput(f"{self.words}.rate_of", self.rate_of, hint)
 
     @property
     def words(self) -> str:
@@ -396,24 +396,24 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if source.band is None:
             if self.area is not None or self.number != (1, 1):
                 what = "number" if self.area is None else "area"
-                mend = (
+                hint = (
                     f"leave it (or volume) out: source {source.name} is not a band and defines its "
                     "blocks"
                 )
-                raise BadInput(f"{self.words}.{what}", getattr(self, what), mend)
+                raise BadInput(f"{self.words}.{what}", getattr(self, what), hint)
         elif source.edges is not None:
             if self.area is not None:
-                mend = f"leave it (or volume) out: the edges of source {source.name} determine it"
-                raise BadInput(f"{self.words}.area", self.area, mend)
+                hint = f"leave it (or volume) out: the edges of source {source.name} determine it"
+                raise BadInput(f"{self.words}.area", self.area, hint)
         elif self.area is None:
-            mend = (
+            hint = (
                 f"give the least and the greatest area of a block of band {source.name} [m2], or a "
                 "volume [m3]"
             )
-            raise BadInput(f"{self.words}.area", None, mend)
+            raise BadInput(f"{self.words}.area", None, hint)
         if source.band is not None and self.number[1] > 1 and self.width is None:
-            mend = "give the width along the road of an event of several blocks [m]"
-            raise BadInput(f"{self.words}.width", None, mend)
+            hint = "give the width along the road of an event of several blocks [m]"
+            raise BadInput(f"{self.words}.width", None, hint)
 
     def block_size(self, source: Source) -> float:
         """Return the typical size of its blocks from `source` [m]."""

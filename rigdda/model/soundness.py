@@ -17,13 +17,13 @@ from rigdda.ground.surface import check_surface
 from rigdda.model import loose_blocks
 from rigdda.model.settings import Settings
 from rigdda.model.site_tables import SiteTables
-from rigdda.model.source import NEAR, Point, Source
+from rigdda.model.source import ALLOWED_OVERLAP, Point, Source
 
-BEYOND = 30.0
+LEAST_BEYOND = 30.0
 """Minimum length of the ground beyond the road [m], so that blocks that cross the road count as
 beyond before they reach the end of the ground."""
 
-SAME = 1e-9
+SAME_POINT = 1e-9
 """Distance below which two points of the ground are the same [m]."""
 
 HIGHEST, LONGEST = 5_000.0, 20_000.0
@@ -73,8 +73,8 @@ def check_site(site: SiteTables) -> None:
     Settings(dt=motion.dt)
 
 
-def _warn(field: str, mend: str) -> None:
-    warnings.warn(f"{field}: {mend}", DoubtfulInput, stacklevel=6)
+def _warn(field: str, hint: str) -> None:
+    warnings.warn(f"{field}: {hint}", DoubtfulInput, stacklevel=6)
 
 
 def check_names(field: str, names: Iterable[str]) -> None:
@@ -108,8 +108,8 @@ def _check_surfaces(site: SiteTables) -> None:
     pairs = [frozenset((pair.first, pair.second)) for pair in site.interfaces]
     for i, names in enumerate(pairs):
         if names in pairs[:i]:
-            mend = "give each pair of surfaces only once, in either order"
-            raise BadInput(f"interfaces[{i}]", " and ".join(sorted(names)), mend)
+            hint = "give each pair of surfaces only once, in either order"
+            raise BadInput(f"interfaces[{i}]", " and ".join(sorted(names)), hint)
     for name in site.lumped:
         check.one_of("lumped", name, site.surfaces)
     for name in site.prices.ditch:
@@ -123,20 +123,20 @@ def _check_slope(site: SiteTables) -> None:
     x, (low, high) = points[:, 0], points[[0, -1], 0]
     if not low < high or points[0, 1] <= points[-1, 1]:
         ends = f"from {points[0].tolist()} to {points[-1].tolist()}"
-        mend = "list them downhill, from the crest at the least x to the end at the greatest x"
-        raise BadInput("slope.points", ends, mend)
+        hint = "list them downhill, from the crest at the least x to the end at the greatest x"
+        raise BadInput("slope.points", ends, hint)
     outside = np.flatnonzero((x < low) | (x > high))
     if outside.size:
-        mend = (
+        hint = (
             f"give an x between {low:g} and {high:g}, those of the first and the last point: the "
             "points go downhill from the least x to the greatest x"
         )
-        raise BadInput(f"slope.points[{outside[0]}]", points[outside[0]].tolist(), mend)
+        raise BadInput(f"slope.points[{outside[0]}]", points[outside[0]].tolist(), hint)
     _check_chain(points)
     tall, long = np.ptp(points[:, 1]), high - low
     if tall > HIGHEST or long > LONGEST:
-        mend = f"give metres: at most {HIGHEST:g} m high and {LONGEST:g} m long"
-        raise BadInput("slope.points", f"{tall:g} m high and {long:g} m long", mend)
+        hint = f"give metres: at most {HIGHEST:g} m high and {LONGEST:g} m long"
+        raise BadInput("slope.points", f"{tall:g} m high and {long:g} m long", hint)
     check.number("road.start", road.start, low, high)
     check.number("slope.toe", site.slope.toe, low, road.start)
     check.number("road.end", road.end, low, high)
@@ -146,29 +146,29 @@ def _check_slope(site: SiteTables) -> None:
         for end in ("start", "end"):
             at = getattr(stretch, end)
             if not low <= at <= high:
-                mend = f"keep {stretch.surface} on the slope: at least {low:g} and at most {high:g}"
-                raise BadInput(f"slope.surfaces[{i}].{end}", at, mend)
-    if high < road.end + BEYOND:
+                hint = f"keep {stretch.surface} on the slope: at least {low:g} and at most {high:g}"
+                raise BadInput(f"slope.surfaces[{i}].{end}", at, hint)
+    if high < road.end + LEAST_BEYOND:
         raise BadInput(
             f"slope.points[{len(points) - 1}]",
             points[-1].tolist(),
-            f"extend the ground to at least x = {road.end + BEYOND:g}, {BEYOND:g} m beyond the "
-            "road, for rock that crosses it",
+            f"extend the ground to at least x = {road.end + LEAST_BEYOND:g}, {LEAST_BEYOND:g} m "
+            "beyond the road, for rock that crosses it",
         )
 
 
 def _check_chain(points: NDArray[np.float64]) -> None:
     """Check that no point of the ground repeats the one before, and that it crosses nowhere."""
-    same = np.flatnonzero(np.hypot(*np.diff(points, axis=0).T) < SAME) + 1
+    same = np.flatnonzero(np.hypot(*np.diff(points, axis=0).T) < SAME_POINT) + 1
     if same.size:
-        mend = "remove it: it repeats the point before it"
-        raise BadInput(f"slope.points[{same[0]}]", points[same[0]].tolist(), mend)
+        hint = "remove it: it repeats the point before it"
+        raise BadInput(f"slope.points[{same[0]}]", points[same[0]].tolist(), hint)
     if shapely.LineString(points).is_simple:
         return
     for k in range(2, len(points)):  # the first point whose piece meets an earlier one
         if not shapely.LineString(points[: k + 1]).is_simple:
-            mend = "correct it or the points before it: the ground crosses itself on the way there"
-            raise BadInput(f"slope.points[{k}]", points[k].tolist(), mend)
+            hint = "correct it or the points before it: the ground crosses itself on the way there"
+            raise BadInput(f"slope.points[{k}]", points[k].tolist(), hint)
 
 
 def _check_events(site: SiteTables) -> None:
@@ -195,8 +195,8 @@ def _check_source(site: SiteTables, source: Source) -> None:
         low, high = source.band
         if low - room < chain[0, 0] or high + room >= site.road.start:
             first, last = chain[0, 0] + room, site.road.start - room
-            mend = f"keep it between {first:g} and {last:g}, so that its blocks clear the road"
-            raise BadInput(f"{source.words}.band", source.band, mend)
+            hint = f"keep it between {first:g} and {last:g}, so that its blocks clear the road"
+            raise BadInput(f"{source.words}.band", source.band, hint)
     for where, piece in source.pieces():
         _check_piece(site, where, piece, ground)
 
@@ -207,12 +207,12 @@ def _check_onward(site: SiteTables, source: Source) -> None:
     back = np.flatnonzero(np.diff(x) < 0.0) + 1
     if back.size:
         k = int(back[0])
-        mend = (
+        hint = (
             f"it lies uphill of slope.points[{k - 1}] at x = {x[k - 1]:g}: correct one of the two, "
             f"or, if the ground overhangs there, give {source.words} a polygon or blocks instead "
             "of a band"
         )
-        raise BadInput(f"slope.points[{k}]", list(site.slope.points[k]), mend)
+        raise BadInput(f"slope.points[{k}]", list(site.slope.points[k]), hint)
 
 
 def _check_piece(
@@ -226,15 +226,15 @@ def _check_piece(
     if right >= site.road.start:
         raise BadInput(where, piece, f"put it uphill of the road at {site.road.start:g}")
     sunk = overlap(rock, ground)
-    if sunk > NEAR * rock.length:
+    if sunk > ALLOWED_OVERLAP * rock.length:
         corners = shapely.points(piece)
         depth = shapely.distance(ground.exterior, corners) * ground.contains(corners)
         corner = int(depth.argmax())
-        mend = (
+        hint = (
             "raise it, or lower slope.points, which are the ground without this rock: it overlaps "
             f"the ground by {sunk:g} m2"
         )
-        raise BadInput(f"{where}[{corner}]", piece[corner], mend)
+        raise BadInput(f"{where}[{corner}]", piece[corner], hint)
 
 
 def _check_forest(site: SiteTables) -> None:
@@ -244,8 +244,8 @@ def _check_forest(site: SiteTables) -> None:
         for name in ("start", "end"):
             at = getattr(forest, name)
             if not low <= at <= high:
-                mend = f"keep it on the slope: at least {low:g} and at most {high:g}"
-                raise BadInput(f"forest[{i}].{name}", at, mend)
+                hint = f"keep it on the slope: at least {low:g} and at most {high:g}"
+                raise BadInput(f"forest[{i}].{name}", at, hint)
 
 
 def _check_zone(site: SiteTables) -> None:
@@ -260,9 +260,9 @@ def _check_zone(site: SiteTables) -> None:
     for source in site.sources:
         for where, piece in source.pieces():
             taken = shapely.intersection(room, shapely.Polygon(piece))
-            if taken.area > NEAR * taken.length:
-                mend = f"put it beyond {taken.bounds[2]:g}: {where} lies in the zone"
-                raise BadInput("barrier_zone.start", zone.start, mend)
+            if taken.area > ALLOWED_OVERLAP * taken.length:
+                hint = f"put it beyond {taken.bounds[2]:g}: {where} lies in the zone"
+                raise BadInput("barrier_zone.start", zone.start, hint)
 
 
 def _check_meshes(site: SiteTables) -> None:

@@ -20,7 +20,7 @@ from rigdda.model.joints import JointSet, cut, spaced_area
 Point = tuple[float, float]
 Floats = NDArray[np.float64]
 
-NEAR = 1e-6
+ALLOWED_OVERLAP = 1e-6
 """Depth to which rock may overlap other rock or the ground at the start [m]; allows for
 rounding."""
 
@@ -53,7 +53,7 @@ SHAPES = {
 }
 """Shapes of blocks by name, as they are seen along the road."""
 
-USUAL = Shape((5, 8), (1.0, 1.5))
+USUAL_SHAPE = Shape((5, 8), (1.0, 1.5))
 """Outline of blocks without a named shape."""
 
 
@@ -128,11 +128,11 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     corners: Annotated[
         tuple[Corners, Corners],
         about("Least and greatest number of corners of a block of a band.", "-", rising=True),
-    ] = USUAL.corners
+    ] = USUAL_SHAPE.corners
     aspect: Annotated[
         tuple[Ratio, Ratio],
         about("Least and greatest length over breadth of a block of a band.", "-", rising=True),
-    ] = USUAL.aspect
+    ] = USUAL_SHAPE.aspect
     edges: Annotated[
         tuple[Edge, Edge, Edge] | None,
         about(
@@ -173,26 +173,26 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         fields.check(self, f"{where}.")
         if self.shape is not None:
             if self.band is None or self.edges is not None:
-                mend = "leave it out: only blocks of a band without edges have a shape"
-                raise BadInput(f"{where}.shape", self.shape, mend)
+                hint = "leave it out: only blocks of a band without edges have a shape"
+                raise BadInput(f"{where}.shape", self.shape, hint)
             for name in ("corners", "aspect"):
-                if getattr(self, name) == getattr(USUAL, name):
+                if getattr(self, name) == getattr(USUAL_SHAPE, name):
                     msgspec.structs.force_setattr(self, name, getattr(SHAPES[self.shape], name))
             msgspec.structs.force_setattr(self, "shape", None)
         if self.edges is not None:
             if self.band is None:
-                mend = "leave it out: only blocks of a band have edges"
-                raise BadInput(f"{where}.edges", self.edges, mend)
+                hint = "leave it out: only blocks of a band have edges"
+                raise BadInput(f"{where}.edges", self.edges, hint)
         if self.block_area is not None and not self.polygon:
-            mend = "leave it out: only a mass with a polygon is cut to an area"
-            raise BadInput(f"{where}.block_area", self.block_area, mend)
+            hint = "leave it out: only a mass with a polygon is cut to an area"
+            raise BadInput(f"{where}.block_area", self.block_area, hint)
         given = [name for name in ("band", "polygon", "blocks") if getattr(self, name)]
-        mend = "give exactly one of band, polygon with joints, blocks"
+        hint = "give exactly one of band, polygon with joints, blocks"
         if not given:
-            raise BadInput(f"{where}.polygon", self.polygon, mend)
+            raise BadInput(f"{where}.polygon", self.polygon, hint)
         if len(given) > 1 or (self.joints and not self.polygon):
             what = given[-1] if len(given) > 1 else "joints"
-            raise BadInput(f"{where}.{what}", getattr(self, what), mend)
+            raise BadInput(f"{where}.{what}", getattr(self, what), hint)
         if self.band is not None:
             check.interval(f"{where}.band", self.band, open_low=True)
         elif self.blocks:
@@ -203,24 +203,24 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def _check_mass(self) -> None:
         convex_polygon(f"{self.words}.polygon", self.polygon)
         if len({j.dip_deg % 180.0 for j in self.joints}) < 2:  # -90 and 90 are the same
-            mend = "give at least two sets with different dips"
-            raise BadInput(f"{self.words}.joints", self.joints, mend)
+            hint = "give at least two sets with different dips"
+            raise BadInput(f"{self.words}.joints", self.joints, hint)
         rock = self.area
         least = rock / MOST_BLOCKS
         if self.block_area is None:
             if self.mean_block_area < least:
                 spacings = [joint.spacing for joint in self.joints]
-                mend = f"give spacings in metres that make at most {MOST_BLOCKS:g} blocks"
-                raise BadInput(f"{self.words}.joints.spacing", spacings, mend)
+                hint = f"give spacings in metres that make at most {MOST_BLOCKS:g} blocks"
+                raise BadInput(f"{self.words}.joints.spacing", spacings, hint)
         elif not least <= self.block_area <= rock:
-            mend = f"give {least:g} to {rock:g} m2: the mass has {rock:g} m2"
-            raise BadInput(f"{self.words}.block_area", self.block_area, mend)
+            hint = f"give {least:g} to {rock:g} m2: the mass has {rock:g} m2"
+            raise BadInput(f"{self.words}.block_area", self.block_area, hint)
 
     def _check_blocks(self) -> None:
         rocks = [shapely.Polygon(simple_polygon(where, b)) for where, b in self.pieces()]
         for i, j in shapely.STRtree(rocks).query(rocks, predicate="intersects").T:
             common = overlap(rocks[i], rocks[j]) if i < j else 0.0
-            if common > NEAR * rocks[j].length:
+            if common > ALLOWED_OVERLAP * rocks[j].length:
                 raise BadInput(
                     f"{self.words}.blocks[{j}]",
                     self.blocks[j],

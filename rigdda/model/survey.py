@@ -19,7 +19,7 @@ from rigdda.model.site_tables import Origin
 
 Floats = NDArray[np.float64]
 
-TEXTS = (".csv", ".txt", ".tsv", ".xyz", ".dat")
+TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".xyz", ".dat")
 """Endings of text files with a table of coordinates."""
 
 SURVEYS = (".csv", ".tsv", ".xyz", ".dat", ".dxf", ".dwg", ".xls", ".xlsx", ".ods")
@@ -61,7 +61,7 @@ FOREIGN = {
 """Spellings of units that are not metres, with letters only."""
 
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
-PLAIN = re.compile(r"[+-]?\d+([.,]\d+)?")
+SURVEY_NUMBER = re.compile(r"[+-]?\d+([.,]\d+)?")
 STATION = re.compile(r"([+-]?)(\d+)\+(\d{3}(?:[.,]\d+)?)")
 """A chainage with the kilometres before a plus sign, such as 12+345.60."""
 
@@ -81,7 +81,7 @@ ROUND = 100.0
 LOWEST, SUMMIT = -450.0, 9_000.0
 """Elevations [m] beyond which there is no ground on land."""
 
-SPIKE, STEEP = 3.0, 0.3
+SPIKE, OUTLIER = 3.0, 0.3
 """Height over both neighbours [m] from which a point is doubted, and the least slope down to each
 of them [-]."""
 
@@ -105,7 +105,7 @@ NAME_COLUMNS = (
 )
 """What to do with a table whose columns are not understood."""
 
-MANY = 2000
+SLOW_POINTS = 2000
 """Points of a profile above which simulations are slow."""
 
 
@@ -158,9 +158,9 @@ def read_survey(path: Path, layer: str | None = None) -> Survey:
         return survey._replace(notes=(*notes, *survey.notes))
     if layer is not None:
         raise BadInput("--layer", layer, "leave it out: only a DXF drawing has layers")
-    if ending not in TEXTS:
-        mend = "save the profile as a CSV file with the columns chainage and elevation, or as DXF"
-        raise BadInput("--profile", str(path), mend)
+    if ending not in TEXT_ENDINGS:
+        hint = "save the profile as a CSV file with the columns chainage and elevation, or as DXF"
+        raise BadInput("--profile", str(path), hint)
     return parse_table(str(path), files.read("--profile", path))
 
 
@@ -178,8 +178,8 @@ def parse_table(name: str, text: str) -> Survey:
     units = body.pop(0) if body and has_names and _are_units(body[0][1]) else None
     for line, cells in body:
         if head and len(cells) > len(head) and any(cells[len(head) :]):
-            mend = "name all columns in the first line; with decimal commas use semicolons"
-            raise BadInput(f"{name} line {line}", f"{len(cells)} columns", mend)
+            hint = "name all columns in the first line; with decimal commas use semicolons"
+            raise BadInput(f"{name} line {line}", f"{len(cells)} columns", hint)
     if not body:
         raise BadInput(name, "no numbers", "give at least two rows of chainage and elevation [m]")
     columns = _named(name, rows[0]) if head else _unnamed(name, body)
@@ -192,11 +192,11 @@ def parse_table(name: str, text: str) -> Survey:
     if len(values) < 2:
         raise BadInput(name, f"{len(values)} point", "give at least two points")
     if not head and len(values) > 2 and (np.diff(values[:, 0]) == 1.0).all():
-        mend = (
+        hint = (
             "name the columns in the first line, chainage and elevation, if these are chainages "
             "and not the numbers of points"
         )
-        raise BadInput(f"{name} line {body[0][0]}", "a first column that counts by ones", mend)
+        raise BadInput(f"{name} line {body[0][0]}", "a first column that counts by ones", hint)
     return Survey(values) if len(columns) == 2 else from_vertices(name, values)
 
 
@@ -303,8 +303,8 @@ def _named(name: str, row: tuple[int, list[str]]) -> list[tuple[str, int]]:
     for found, what in zip(used, ("elevations", "chainages", "northings"), strict=False):
         if len(found) > 1:
             several = " and ".join(head[k] for k in found)
-            mend = f"keep one column of {what}, and delete or rename the others"
-            raise BadInput(where, several, mend)
+            hint = f"keep one column of {what}, and delete or rename the others"
+            raise BadInput(where, several, hint)
     if not all(used):
         raise BadInput(where, ", ".join(head), NAME_COLUMNS)
     words = ("elevation", "chainage") if chainage else ("elevation", "easting", "northing")
@@ -383,11 +383,11 @@ def _check_decimal_signs(
                 found.setdefault(sign, text)
             if len(found) > 1:
                 one, other = found.values()
-                mend = (
+                hint = (
                     "use one decimal sign and no separators of thousands: the table also has "
                     f"{one if text == other else other}"
                 )
-                raise BadInput(where, text, mend)
+                raise BadInput(where, text, hint)
 
 
 def _number(name: str, line: int, cells: Sequence[str], what: str, at: int) -> float:
@@ -403,12 +403,12 @@ def _number(name: str, line: int, cells: Sequence[str], what: str, at: int) -> f
         size = 1000.0 * float(found[2]) + float(found[3].replace(",", "."))
         return -size if found[1] == "-" else size
     if what == "chainage" and re.fullmatch(r"[+-]?\d+\+[\d.,]+", text):
-        mend = "write stations as kilometres and metres, such as 0+150, or in metres"
-        raise BadInput(where, cell, mend)
+        hint = "write stations as kilometres and metres, such as 0+150, or in metres"
+        raise BadInput(where, cell, hint)
     if not NUMBER.fullmatch(text):
         packed = THOUSANDS.fullmatch(text)
-        mend = "write it without separators of thousands" if packed else "give a number in metres"
-        raise BadInput(where, cell, mend)
+        hint = "write it without separators of thousands" if packed else "give a number in metres"
+        raise BadInput(where, cell, hint)
     value = float(text.replace(",", "."))
     if not math.isfinite(value):
         raise BadInput(where, cell, "give a finite number in metres")
@@ -433,8 +433,8 @@ def from_vertices(name: str, vertices: Floats) -> Survey:
     way = flat[-1] - start
     length = float(np.hypot(*way))
     if length < CLOSE:
-        mend = "let the profile run from the crest to beyond the road: its ends are in one place"
-        raise BadInput(name, flat[-1].tolist(), mend)
+        hint = "let the profile run from the crest to beyond the road: its ends are in one place"
+        raise BadInput(name, flat[-1].tolist(), hint)
     along = (flat - start) @ way / length
     aside = float(np.abs((flat - start) @ [-way[1], way[0]] / length).max())
     note = "chainage is measured in plan, from the first point towards the last"
@@ -472,10 +472,10 @@ def profile_of(name: str, survey: Survey, road: tuple[float, float] | None = Non
     _check_elevations(name, survey.points)
     points = _distinct(name, survey.points, notes)
     if points[0, 0] == points[-1, 0]:
-        mend = (
+        hint = (
             "let the profile run from the crest to beyond the road: its ends have the same chainage"
         )
-        raise BadInput(name, points[-1].tolist(), mend)
+        raise BadInput(name, points[-1].tolist(), hint)
     if points[0, 0] > points[-1, 0]:
         points = points[::-1]
         notes.append("the points were listed against the chainage; their order was reversed")
@@ -517,8 +517,8 @@ def _check_length(name: str, points: Floats) -> None:
     """Check that a profile is no longer than one in metres can be."""
     long, tall = np.ptp(points, axis=0).tolist()
     if long > LONGEST:
-        mend = f"give metres: at most {LONGEST:g} m long and {HIGHEST:g} m high"
-        raise BadInput(name, f"{long:g} m long and {tall:g} m high", mend)
+        hint = f"give metres: at most {LONGEST:g} m long and {HIGHEST:g} m high"
+        raise BadInput(name, f"{long:g} m long and {tall:g} m high", hint)
 
 
 def _check_elevations(name: str, points: Floats) -> None:
@@ -529,11 +529,11 @@ def _check_elevations(name: str, points: Floats) -> None:
         wrong = np.array(_zeros(points), dtype=np.intp)
     if wrong.size:
         k = int(wrong[0])
-        mend = (
+        hint = (
             f"delete the point or give its elevation: no ground lies at {y[k]:g} m there, which "
             "may stand for a missing value"
         )
-        raise BadInput(f"{name} point {k + 1}", points[k].tolist(), mend)
+        raise BadInput(f"{name} point {k + 1}", points[k].tolist(), hint)
 
 
 def _zeros(points: Floats) -> list[int]:
@@ -545,7 +545,7 @@ def _zeros(points: Floats) -> list[int]:
             sides = points[[before[-1], after[0]]]
             runs = np.maximum(np.abs(sides[:, 0] - points[k, 0]), CLOSE)
             same = sides[0, 1] * sides[1, 1] > 0.0
-            far = np.abs(sides[:, 1]) >= np.maximum(SPIKE, STEEP * runs)
+            far = np.abs(sides[:, 1]) >= np.maximum(SPIKE, OUTLIER * runs)
             if same and far.all():
                 found.append(int(k))
     return found
@@ -561,7 +561,7 @@ def spikes(points: Floats) -> list[tuple[int, float]]:
         (x0, y0), (x, y), (x1, y1) = points[k - 1], points[k], points[k + 1]
         up = y - max(y0, y1) if y > max(y0, y1) else min(0.0, y - min(y0, y1))
         steep = min(abs(y - y0) / max(abs(x - x0), CLOSE), abs(y - y1) / max(abs(x1 - x), CLOSE))
-        if abs(up) >= SPIKE and steep >= STEEP:
+        if abs(up) >= SPIKE and steep >= OUTLIER:
             found.append((k, float(up)))
     return found
 
@@ -577,22 +577,22 @@ def _check_shape(name: str, points: Floats) -> None:
     x, y = points.T
     tall = float(np.ptp(y))
     if tall > HIGHEST:
-        mend = f"give metres: at most {HIGHEST:g} m high"
-        raise BadInput(name, f"{tall:g} m high", mend)
+        hint = f"give metres: at most {HIGHEST:g} m high"
+        raise BadInput(name, f"{tall:g} m high", hint)
     if tall == 0.0:
         raise BadInput(name, f"all points at elevation {y[0]:g}", "give a profile with a slope")
     back = np.diff(x) < 0.0
     if back.mean() > BACKWARD:
         first = int(np.flatnonzero(back)[0])
-        mend = "sort the points along the profile: the chainage goes back and forth"
-        raise BadInput(f"{name} point {first + 2}", points[first + 1].tolist(), mend)
+        hint = "sort the points along the profile: the chainage goes back and forth"
+        raise BadInput(f"{name} point {first + 2}", points[first + 1].tolist(), hint)
     if x.min() < x[0] or x.max() > x[-1]:
         far = int(x.argmin()) if x.min() < x[0] else int(x.argmax())
-        mend = "begin and end with the points of least and greatest chainage: add ground beyond it"
-        raise BadInput(f"{name} point {far + 1}", points[far].tolist(), mend)
+        hint = "begin and end with the points of least and greatest chainage: add ground beyond it"
+        raise BadInput(f"{name} point {far + 1}", points[far].tolist(), hint)
     if not shapely.LineString(points).is_simple:
-        mend = "put the points in order along the ground: the profile crosses itself"
-        raise BadInput(name, f"{len(points)} points", mend)
+        hint = "put the points in order along the ground: the profile crosses itself"
+        raise BadInput(name, f"{len(points)} points", hint)
 
 
 def _rises_to_crest(name: str, points: Floats, road: tuple[float, float] | None) -> bool:
@@ -600,19 +600,19 @@ def _rises_to_crest(name: str, points: Floats, road: tuple[float, float] | None)
     (start, low), (end, high) = points[[0, -1]]
     if road is not None:
         if not (start <= min(road) and max(road) <= end):
-            mend = f"put it on the profile, which runs from chainage {start:.10g} to {end:.10g}"
-            raise BadInput("--road", list(road), mend)
+            hint = f"put it on the profile, which runs from chainage {start:.10g} to {end:.10g}"
+            raise BadInput("--road", list(road), hint)
         x, y = points.T
         at = float(np.interp(0.5 * sum(road), x, y))
         if high > low and at > 0.5 * (high + y.min()):
-            mend = (
+            hint = (
                 f"check it: the road would be at elevation {at:g}, in the upper half of a profile "
                 f"that rises to {high:g} at chainage {end:.10g}"
             )
-            raise BadInput("--road", list(road), mend)
+            raise BadInput("--road", list(road), hint)
     if high == low:
-        mend = "let the profile begin at the crest and end below, beyond the road"
-        raise BadInput(name, f"both ends at elevation {low:g}", mend)
+        hint = "let the profile begin at the crest and end below, beyond the road"
+        raise BadInput(name, f"both ends at elevation {low:g}", hint)
     return bool(high > low)
 
 
@@ -651,5 +651,5 @@ def _add_warnings(points: Floats, notes: list[str]) -> None:
         notes.append(
             f"the ground overhangs at x = {at}: no band of loose rock and no earthwork can be there"
         )
-    if len(points) > MANY:
+    if len(points) > SLOW_POINTS:
         notes.append(f"{len(points)} points make simulations slow: thin the survey to some hundred")

@@ -49,14 +49,14 @@ from rigdda.fields import about, documented
 
 Floats = NDArray[np.float64]
 
-DAYS = 365.0
+DAYS_PER_YEAR = 365.0
 """Days per year."""
 
 REACTION, DECELERATION = 2.5, 3.4
 """Reaction time [s] and deceleration [m/s2] of the stopping sight distance of AASHTO (A Policy on
 Geometric Design of Highways and Streets)."""
 
-USUAL = ((1.0, 0.3), (10.0, 1.0))
+USUAL_VULNERABILITY = ((1.0, 0.3), (10.0, 1.0))
 """Default vulnerability by volume [m3, -]. The probabilities are those recommended by the
 Australian Geomechanics Society (2007) for a vehicle that is damaged only (0 to 0.3) and for one
 that is buried or crushed (0.9 to 1). The volumes are an assumption."""
@@ -73,7 +73,7 @@ Distance = Annotated[float, about(ge=0.0, le=2000.0)]
 Value = Annotated[float, about(ge=0.0, le=1e9)]
 
 
-class Toll(NamedTuple):
+class TrafficConsequences(NamedTuple):
     """Expected consequences of releases for the traffic, each a float or an (n,) array.
 
     Parameters
@@ -189,22 +189,22 @@ class Traffic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         fields.check(self, "traffic.")
         if self.decision_sight_distance is not None and self.run_into is not None:
-            mend = "leave it out: the decision_sight_distance says how many vehicles cannot stop"
-            raise BadInput("traffic.run_into", self.run_into, mend)
+            hint = "leave it out: the decision_sight_distance says how many vehicles cannot stop"
+            raise BadInput("traffic.run_into", self.run_into, hint)
         if self.vulnerability is None:
             if self.vulnerability_by == "energy":
-                mend = "also give traffic.vulnerability as pairs [energy in kJ, probability]"
-                raise BadInput("traffic.vulnerability_by", "energy", mend)
+                hint = "also give traffic.vulnerability as pairs [energy in kJ, probability]"
+                raise BadInput("traffic.vulnerability_by", "energy", hint)
             return
         last = -math.inf
         for i, (size, probability) in enumerate(self.vulnerability):
             where = f"traffic.vulnerability[{i}]"
             if probability > 1.0:
-                mend = "give a probability from 0 to 1 as the second number"
-                raise BadInput(where, [size, probability], mend)
+                hint = "give a probability from 0 to 1 as the second number"
+                raise BadInput(where, [size, probability], hint)
             if size <= last:
-                mend = f"list increasing sizes: the one before is {last:g}"
-                raise BadInput(where, [size, probability], mend)
+                hint = f"list increasing sizes: the one before is {last:g}"
+                raise BadInput(where, [size, probability], hint)
             last = size
 
     @property
@@ -239,20 +239,20 @@ class Traffic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         energy : float or (n,) array
             Largest energy of a block over the road [J].
         """
-        sizes, chances = zip(*(self.vulnerability or USUAL), strict=True)
+        sizes, chances = zip(*(self.vulnerability or USUAL_VULNERABILITY), strict=True)
         by_energy = self.vulnerability_by == "energy"
         size = np.asarray(energy, dtype=np.float64) / 1e3 if by_energy else np.asarray(volume)
         found: Floats = np.asarray(np.interp(size, sizes, chances))
         return found
 
-    def toll(
+    def consequences(
         self,
         reached: ArrayLike,
         lies: ArrayLike,
         width: ArrayLike,
         volume: ArrayLike,
         energy: ArrayLike,
-    ) -> Toll:
+    ) -> TrafficConsequences:
         """Return the expected consequences of releases, floats or (n,) arrays.
 
         Parameters
@@ -267,7 +267,7 @@ class Traffic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         hit = np.where(reached, self.hit(width), 0.0)
         run_into = np.where(lies, self.stopped_late, 0.0)
         killed = hit * self.deadly(volume, energy) + run_into * self.vulnerability_run_into
-        return Toll(hit, run_into, self.occupancy * killed)
+        return TrafficConsequences(hit, run_into, self.occupancy * killed)
 
     def price(self, fatalities: ArrayLike) -> Floats:
         """Return the value of fatalities [EUR]; 0 without a value of a prevented fatality."""
@@ -280,4 +280,4 @@ class Traffic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         A person makes `commuter_trips` of the N_v 365 passages of a year, and is one of `occupancy`
         persons in the vehicle.
         """
-        return self.commuter_trips / (DAYS * self.vehicles_per_day * self.occupancy)
+        return self.commuter_trips / (DAYS_PER_YEAR * self.vehicles_per_day * self.occupancy)

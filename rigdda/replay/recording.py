@@ -85,12 +85,12 @@ EDGE = 0.01
 """z offset of an outline above its fill [m]."""
 
 SKY: Colour = (233, 240, 246)
-GROUND: Colour = (201, 188, 165)
-BARRIER: Colour = (28, 90, 160)
-BROKEN: Colour = (176, 182, 188)
+GROUND_RGB: Colour = (201, 188, 165)
+BARRIER_RGB: Colour = (28, 90, 160)
+BROKEN_RGB: Colour = (176, 182, 188)
 FAILED_BARRIER: Colour = (214, 40, 70)
-ROAD: Colour = (232, 93, 4)
-ROCK: tuple[Colour, ...] = ((104, 88, 74), (128, 108, 90), (88, 80, 76), (146, 122, 98))
+ROAD_RGB: Colour = (232, 93, 4)
+ROCKS_RGB: tuple[Colour, ...] = ((104, 88, 74), (128, 108, 90), (88, 80, 76), (146, 122, 98))
 INK: Colour = (40, 34, 30)
 
 
@@ -154,16 +154,16 @@ class Marks:
         """
         count = len(scene.barriers)
         if self.labels and len(self.labels) != count:
-            mend = f"give one for each of {count} barriers, or none"
-            raise BadInput("labels", self.labels, mend)
+            hint = f"give one for each of {count} barriers, or none"
+            raise BadInput("labels", self.labels, hint)
         return self.labels or [describe(barrier) for barrier in scene.barriers]
 
 
-MOVING = 0.1
+MOVING_SPEED = 0.1
 """Speed above which a block counts as moving [m/s]; a slower block creeps less than 1 m in 10 s."""
 
 PLOTS = {
-    "kinetic_energy": ("kinetic energy [J]", ROAD),
+    "kinetic_energy": ("kinetic energy [J]", ROAD_RGB),
     "debris": ("debris past the road's edge [share of mass]", (214, 40, 70)),
     "greatest_speed": ("greatest speed [m/s]", (150, 90, 200)),
     "moving": ("moving blocks", (40, 150, 90)),
@@ -187,7 +187,7 @@ def scalars(run: RecordedMotion, marks: Marks) -> dict[str, Floats]:
         "kinetic_energy": 0.5 * (squared @ mass + omega**2 @ inertia),
         "potential_energy": -(gx * x + gy * y) @ mass,
         "greatest_speed": np.sqrt(squared.max(axis=1)),
-        "moving": np.count_nonzero(squared > MOVING**2, axis=1).astype(np.float64),
+        "moving": np.count_nonzero(squared > MOVING_SPEED**2, axis=1).astype(np.float64),
     }
     if marks.road is not None:
         out["debris"] = run.passed(marks.road[0])[:, free] @ mass / mass.sum()
@@ -293,11 +293,11 @@ def read_record(path: str | os.PathLike[str]) -> str:
     try:
         chunks = RrdReader(file).stream().filter(content=RECORD, is_static=True).to_chunks()
     except (ValueError, RuntimeError, OSError) as error:
-        mend = f"name a whole .rrd file that rigdda recorded ({error})"
-        raise BadInput("replay file", str(path), mend) from None
+        hint = f"name a whole .rrd file that rigdda recorded ({error})"
+        raise BadInput("replay file", str(path), hint) from None
     if not chunks:
-        mend = "name one that an environment, `rigdda design` or `rigdda replay SITE` recorded"
-        raise BadInput("replay file", str(path), mend)
+        hint = "name one that an environment, `rigdda design` or `rigdda replay SITE` recorded"
+        raise BadInput("replay file", str(path), hint)
     ((text,),) = chunks[0].to_record_batch().column("TextDocument:text").to_pylist()
     return str(text)
 
@@ -375,12 +375,14 @@ def _log_setting(rec: rr.RecordingStream, world: str, run: RecordedMotion, marks
         return
     chain = ground.points
     surface = shapely.LineString(chain)
-    _log_shape(rec, f"{world}/terrain", _ground(chain, bottom), LAYER["terrain"], GROUND, surface)
+    _log_shape(
+        rec, f"{world}/terrain", _ground(chain, bottom), LAYER["terrain"], GROUND_RGB, surface
+    )
     if marks.road is not None:
         start, end = marks.road
         road = shapely.clip_by_rect(surface, start, bottom, end, top)
         strips = [_lift(piece, LAYER["road"]) for piece in shapely.get_parts(road)]
-        line = rr.LineStrips3D(strips, colors=ROAD, radii=rr.Radius.ui_points(3.0))
+        line = rr.LineStrips3D(strips, colors=ROAD_RGB, radii=rr.Radius.ui_points(3.0))
         rec.log(f"{world}/road", line, static=True)
 
 
@@ -392,20 +394,20 @@ def _log_barrier(
     outline = run.scene.outline(i)
     if barrier.drawn == "line":
         edge = np.insert(np.concatenate([outline, outline[:1]]), 2, z + EDGE, axis=1)
-        line = rr.LineStrips3D([edge], colors=BARRIER, radii=rr.Radius.ui_points(1.5))
+        line = rr.LineStrips3D([edge], colors=BARRIER_RGB, radii=rr.Radius.ui_points(1.5))
         rec.log(entity, line, static=True)
         return
     if barrier.drawn == "moving":
         body = shapely.Polygon(outline - polygon_properties(outline)[1])
-        _log_shape(rec, entity, body, 0.0, BARRIER)
+        _log_shape(rec, entity, body, 0.0, BARRIER_RGB)
         _log_motion(rec, entity, clock(run.times), run.barrier_poses[:, i], z)
         return
     failure = run.failure(i)
     whole = shapely.Polygon(outline)
-    _log_shape(rec, entity, whole, z, BARRIER if np.isinf(failure) else None)
+    _log_shape(rec, entity, whole, z, BARRIER_RGB if np.isinf(failure) else None)
     if np.isfinite(failure):
         when = clock([run.times[0], failure])
-        rec.send_columns(entity, when, rr.Mesh3D.columns(albedo_factor=[BARRIER, BROKEN]))
+        rec.send_columns(entity, when, rr.Mesh3D.columns(albedo_factor=[BARRIER_RGB, BROKEN_RGB]))
 
 
 def _log_state(
@@ -417,7 +419,7 @@ def _log_state(
     left, bottom, right, high = frame(run.scene)
     lift = LABEL * max(right - left, high - bottom) * (1 + i % 3)
     place = (x, top + lift, LAYER["blocks"] + EDGE)
-    colours = [BARRIER if state == STANDS else FAILED_BARRIER for _, state in changes]
+    colours = [BARRIER_RGB if state == STANDS else FAILED_BARRIER for _, state in changes]
     rec.send_columns(
         entity,
         clock([time for time, _ in changes]),
@@ -450,7 +452,7 @@ def _log_block(
     """Log block `i`: its polygon about its centroid, and its pose in every frame."""
     block = run.scene.blocks[i]
     body = block.vertices - polygon_properties(block.vertices)[1]
-    colour = GROUND if block.fixed else ROCK[i % len(ROCK)]
+    colour = GROUND_RGB if block.fixed else ROCKS_RGB[i % len(ROCKS_RGB)]
     _log_shape(rec, entity, shapely.Polygon(body), 0.0, colour)
     _log_motion(rec, entity, clock(run.times), run.poses[:, i], LAYER["blocks"])
 

@@ -68,10 +68,10 @@ def test_prospect_is_read_again_and_other_files_are_refused(tmp_path: Path) -> N
 
 
 def test_shipped_prospect_names_its_command() -> None:
-    from rigdda.agents.corridor.agent import FILE
+    from rigdda.agents.corridor.agent import PROSPECT_FILE
 
     assert shipped().gain[-1] < 1.0
-    assert Network.load(FILE).notes["command"].startswith("rigdda train --model corridor")
+    assert Network.load(PROSPECT_FILE).notes["command"].startswith("rigdda train --model corridor")
 
 
 @pytest.mark.slow

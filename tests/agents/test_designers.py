@@ -14,7 +14,7 @@ from rigdda import BadInput, Barrier, Fence, Layout, Outcome
 from rigdda.agents import DESIGNERS
 from rigdda.agents.designers.convex import starts
 from rigdda.agents.designers.protocol import (
-    MISSED,
+    MISSED_TARGET_PENALTY,
     STREAMS,
     DesignResult,
     Ledger,
@@ -186,7 +186,7 @@ def test_layouts_that_miss_a_target_rank_behind() -> None:
     assert good.objective > none.objective > bad.objective
     order = sorted([none, bad, good], key=lambda e: score(problem, e))
     assert order == sorted([none, bad, good], key=lambda e: value(problem, e)) == [good, bad, none]
-    assert value(problem, bad) > MISSED > value(problem, good) == good.objective
+    assert value(problem, bad) > MISSED_TARGET_PENALTY > value(problem, good) == good.objective
     few = problem.evaluate((BEST,), seeds[:12])
     assert few.targets == "undecided"
     assert score(problem, few)[0] == 0.0 < final_score(problem, few)[0]

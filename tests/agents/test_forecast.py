@@ -12,7 +12,7 @@ from rigdda import BadInput
 from rigdda.agents import value_training
 from rigdda.agents.designers import value
 from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble
-from rigdda.agents.designers.forecast import WIDTH, Forecast, value_network
+from rigdda.agents.designers.forecast import LAYOUT_FEATURES, Forecast, value_network
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.surrogate import Surrogate
 from rigdda.agents.policy import Network
@@ -51,7 +51,7 @@ def test_features_are_finite_and_forecasts_are_shares(
     forecast, menu = Forecast(problem, crossings, value_network()), Menu(problem)
     layouts = [(), *((b,) for kind in problem.kinds for b in menu.singles(kind)[::25])]
     features = np.array([forecast.features(layout) for layout in layouts])
-    assert features.shape == (len(layouts), len(problem.site.events), WIDTH)
+    assert features.shape == (len(layouts), len(problem.site.events), LAYOUT_FEATURES)
     assert np.isfinite(features).all()
     shares = forecast.remaining(layouts)
     assert ((shares >= 0.0) & (shares <= 1.2)).all()
@@ -95,7 +95,7 @@ def test_a_training_of_the_value_network_continues(
     monkeypatch.setattr(value_training, "DesignProblem", lambda name: DesignProblem(SITE))
     terms = value_training.ValueTerms(2, 3)
     first = value_training.train(terms, tmp_path, lambda *_: None)
-    assert first.sizes == [WIDTH, 128, 128, 4] and first.finite
+    assert first.sizes == [LAYOUT_FEATURES, 128, 128, 4] and first.finite
     (tmp_path / "random-1.npz").unlink()
     again = value_training.train(terms, tmp_path, lambda *_: None)
     saved = Network.load(tmp_path / "value.safetensors")

@@ -12,12 +12,12 @@ from safetensors.numpy import save_file
 
 from rigdda import BadInput, Site
 from rigdda.agents import policy
-from rigdda.agents.policy import ANCHOR, NAMES, SLOTS, WIDTH, Network, decide, features
+from rigdda.agents.policy import ANCHOR, FEATURES, NAMES, SLOTS, Network, decide, features
 from rigdda.envs import DesignProblem
 from rigdda.envs.observation import FIELDS, observe
 
 
-def network(outputs: np.ndarray, inputs: int = WIDTH) -> Network:
+def network(outputs: np.ndarray, inputs: int = FEATURES) -> Network:
     """A network that always says the same."""
     layer = (np.zeros((len(outputs), inputs), np.float32), outputs.astype(np.float32))
     zeros, ones = np.zeros(inputs, np.float32), np.ones(inputs, np.float32)
@@ -40,7 +40,7 @@ def test_features_are_what_is_seen_of_the_site(site: Site) -> None:
     problem = DesignProblem(site)
     seen = observe(problem)
     line = features(seen)
-    assert line.shape == (WIDTH,) and line.dtype == np.float32 and np.isfinite(line).all()
+    assert line.shape == (FEATURES,) and line.dtype == np.float32 and np.isfinite(line).all()
     assert set(seen) == set(NAMES)
     np.testing.assert_array_equal(line[: FIELDS[NAMES[0]].size], seen[NAMES[0]])
 
@@ -128,15 +128,15 @@ def test_a_network_of_another_shape_is_refused(tmp_path: Path) -> None:
         ({"mean": np.float32(0.0)}, SHAPE),
         ({"bias": np.float32(0.0)}, SHAPE),
         ({"bias": np.full(SLOTS.size, np.nan)}, "finite numbers"),
-        ({"weight": np.full((SLOTS.size, WIDTH), np.inf)}, "finite numbers"),
-        ({"scale": np.zeros(WIDTH)}, "positive scales"),
+        ({"weight": np.full((SLOTS.size, FEATURES), np.inf)}, "finite numbers"),
+        ({"scale": np.zeros(FEATURES)}, "positive scales"),
     ],
 )
 def test_a_damaged_network_is_refused(
     change: dict[str, np.ndarray], words: str, tmp_path: Path
 ) -> None:
-    whole = {"mean": np.zeros(WIDTH), "scale": np.ones(WIDTH)}
-    whole |= {"weight": np.zeros((SLOTS.size, WIDTH)), "bias": np.zeros(SLOTS.size)} | change
+    whole = {"mean": np.zeros(FEATURES), "scale": np.ones(FEATURES)}
+    whole |= {"weight": np.zeros((SLOTS.size, FEATURES)), "bias": np.zeros(SLOTS.size)} | change
     names = {"weight": "weight 0", "bias": "bias 0"}
     file = tmp_path / "damaged.safetensors"
     save_file({names.get(k, k): np.array(v, np.float32) for k, v in whole.items()}, file)

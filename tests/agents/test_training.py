@@ -14,7 +14,7 @@ from processes import refused, rig, run
 from rigdda import sites
 from rigdda.agents import policy, training
 from rigdda.agents.designers import ppo
-from rigdda.agents.policy import SLOTS, WIDTH, Network, decide
+from rigdda.agents.policy import FEATURES, SLOTS, Network, decide
 from rigdda.envs import DesignProblem
 
 SMALL = ("--sites", 2, "--episodes", 16)
@@ -234,7 +234,7 @@ NAMES = sites.split(training.SPLIT)[:2]
 
 @pytest.fixture
 def featured() -> ppo.Featured:
-    zeros, ones = np.zeros(WIDTH, np.float32), np.ones(WIDTH, np.float32)
+    zeros, ones = np.zeros(FEATURES, np.float32), np.ones(FEATURES, np.float32)
     return ppo.Featured(ppo.pool(NAMES, training.FIDELITY), zeros, ones)
 
 
@@ -253,10 +253,10 @@ def test_every_copy_of_the_pool_keeps_its_site() -> None:
 
 
 def test_an_action_of_nothing_builds_what_the_policy_starts_from(featured: ppo.Featured) -> None:
-    assert featured.reset().shape == (2, WIDTH)
+    assert featured.reset().shape == (2, FEATURES)
     _, _, _, infos = featured.step(np.zeros((2, SLOTS.size), np.float32))
-    layer = np.zeros((SLOTS.size, WIDTH), np.float32), np.zeros(SLOTS.size, np.float32)
-    zeros, ones = np.zeros(WIDTH, np.float32), np.ones(WIDTH, np.float32)
+    layer = np.zeros((SLOTS.size, FEATURES), np.float32), np.zeros(SLOTS.size, np.float32)
+    zeros, ones = np.zeros(FEATURES, np.float32), np.ones(FEATURES, np.float32)
     nothing = Network(zeros, ones, [layer], {})
     for name, info in zip(NAMES, infos, strict=True):
         said = decide(nothing, training.problem(name))

@@ -13,7 +13,7 @@ from rigdda.agents.designers import rule
 from rigdda.agents.designers.menu import Menu
 from rigdda.app.barrier_checks import LayoutChecks, check_layout
 from rigdda.envs import DesignProblem, design_envelope
-from rigdda.envs.barrier_formulas import OTHER, ROCK, BarrierCheck, Base
+from rigdda.envs.barrier_formulas import PRESSURE_ON_ROCK, PRESSURE_ON_SOIL, BarrierCheck, Base
 from rigdda.envs.fence_checks import demand_at
 from rigdda.envs.ritchie_ditch import RitchieDitch
 from rigdda.model.existing import Existing
@@ -88,7 +88,7 @@ def test_a_wall_is_checked_by_hand_formulas(problem: DesignProblem) -> None:
     assert checks["overturning, rock"].demand == pytest.approx(1e-3 * thrust * wall.height / 3.0)
     pressed = wall.thickness - 2.0 * thrust * wall.height / 3.0 / base.weight
     assert checks["bearing, rock"].demand == pytest.approx(1e-3 * base.weight / pressed)
-    assert checks["bearing, rock"].capacity in (1e-3 * ROCK, 1e-3 * OTHER)
+    assert checks["bearing, rock"].capacity in (1e-3 * PRESSURE_ON_ROCK, 1e-3 * PRESSURE_ON_SOIL)
     assert checks["sliding, rock"].limit == pytest.approx(1.0 / 1.5)
 
 
@@ -133,7 +133,7 @@ def test_the_rule_and_the_checks_agree_behind_an_existing_fence() -> None:
         old = Existing(kind="fence", x=18.3, height=2.0, energy_class=500, removable=removable)
         problem = DesignProblem(msgspec.structs.replace(site, existing=(old,)), kinds=KINDS)
         found = rule.answer(problem)
-        assert found.name == rule.NAME and found.check is not None
+        assert found.name == rule.RULE_NAME and found.check is not None
         sheets = {sheet.fence: sheet for sheet in check_layout(problem, found.layout).fences}
         sheet = sheets[found.layout[0]]
         assert sheet.uses == pytest.approx(found.check.uses)

@@ -20,7 +20,7 @@ import rigdda
 from rigdda import BadInput, Corridor, CorridorSection, Ditch, Site, load_layout
 from rigdda.agents.corridor import allocation, planning, programme
 from rigdda.agents.corridor.allocation import Estimates
-from rigdda.agents.corridor.programme import METHODS, Options
+from rigdda.agents.corridor.programme import SIMPLE_METHODS, Options
 from rigdda.envs import CorridorProblem
 from rigdda.model import corridor as corridors
 
@@ -75,7 +75,7 @@ def test_simple_methods_stay_within_the_budget_and_are_not_better(
 ) -> None:
     given = options(rows)
     best = enumerated(given, budget)
-    for method in METHODS.values():
+    for method in SIMPLE_METHODS.values():
         choice = method(given, budget)
         assert given.total(choice, given.costs) <= budget * (1.0 + 1e-6) + 1e-6
         assert given.total(choice, given.values) >= best - 1e-6
@@ -151,7 +151,9 @@ def test_releases_go_to_the_section_whose_choice_is_uncertain() -> None:
     assert close[1] > 100.0 * clear[1]
     priced = section([40.0]).worth([0.4])  # 100 EUR/m at .4 a year cost as much as they save
     assert priced[1] > 100.0 * clear[1]
-    found = allocation.batches([section([40.0]), section([1.0])], [0.0], 20 * allocation.BATCH)
+    found = allocation.batches(
+        [section([40.0]), section([1.0])], [0.0], 20 * allocation.BATCH_RELEASES
+    )
     assert found[1, 1] > 10 and sum(found.values()) == 20
     assert all(option > 0 for _, option in found)  # no barrier is known already
 

@@ -20,7 +20,7 @@ def test_fast_has_fewer_larger_blocks_and_a_longer_step() -> None:
     site = Site.load("quick")
     fast = problem.site_at_fidelity(site, "fast")
     fewer, more = (len(s.realise(seed=0, event="mass").blocks) for s in (fast, site))
-    assert fewer == pytest.approx(more / problem.COARSER, rel=0.25)
+    assert fewer == pytest.approx(more / problem.FAST_AREA_FACTOR, rel=0.25)
     assert fast.motion.dt == max(problem.FAST_DT, site.motion.dt)
     assert problem.site_at_fidelity(site, "full") is site
     with pytest.raises(BadInput, match="fidelity = 'coarse': choose one of fast, full"):

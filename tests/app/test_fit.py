@@ -11,7 +11,7 @@ from rigdda import BadInput, Site
 from rigdda.app.cli import main
 from rigdda.app.uncertainty import fit
 from rigdda.app.uncertainty.fit import check_parameters, run_outs, scores
-from rigdda.app.uncertainty.observations import RUN_OUT, DataSet, read
+from rigdda.app.uncertainty.observations import OBSERVED_RUN_OUT, DataSet, read
 from rigdda.app.uncertainty.parameters import Parameter, parse, with_values
 from rigdda.model.site_tables import Rebound
 
@@ -50,7 +50,7 @@ def test_values_are_found_again_with_what_they_predict():
     parameters, real = truth()
     events = ["block", "small, face"]
     observed = run_outs(real, "lumped", events, range(900, 1020))
-    sets = {event: DataSet(RUN_OUT, event, values) for event, values in observed.items()}
+    sets = {event: DataSet(OBSERVED_RUN_OUT, event, values) for event, values in observed.items()}
     found = fit.fit(SITE, sets, parameters, 96, 60, 0, lambda done, words: None, "lumped")
     exact = np.array(list(TRUE.values()))
     # a point that bounces on a short verge hardly slides: friction is left open, and said to be
@@ -98,7 +98,7 @@ def test_limits_are_checked(text):
 def test_damping_of_grounds_is_not_fitted(path, named):
     with pytest.raises(BadInput, match=r"^--parameters = '[a-z_.]+': name .*rolling resist") as bad:
         with_values(SITE, [parse(path)], [0.4])
-    assert f"name {named}:" in bad.value.mend
+    assert f"name {named}:" in bad.value.hint
 
 
 def test_damping_in_flight_and_the_rolling_resistance_have_limits():

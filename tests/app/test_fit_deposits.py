@@ -12,7 +12,7 @@ from processes import refused, rig, rows, run
 
 from rigdda import BadInput, Site
 from rigdda.app.uncertainty import fit
-from rigdda.app.uncertainty.observations import DEPOSIT, RUN_OUT, DataSet, read
+from rigdda.app.uncertainty.observations import DEPOSIT, OBSERVED_RUN_OUT, DataSet, read
 from rigdda.app.uncertainty.parameters import parse, read_posterior, with_values
 from rigdda.app.uncertainty.score_surface import best_places
 from rigdda.passages import passages
@@ -121,7 +121,7 @@ def test_passages_and_run_outs_are_fitted_together(tmp_path: Path) -> None:
 def test_a_deposit_is_spread_evenly_within_its_intervals() -> None:
     one = DataSet(DEPOSIT, "block", np.array([0.0, 10.0, 30.0]), np.nan, np.array([0.25, 0.75]), 8)
     assert one.sample(4).tolist() == pytest.approx([5.0, 10 + 20 / 6, 20.0, 10 + 20 * 5 / 6])
-    assert DataSet(RUN_OUT, "block", np.zeros(3)).name == "block"
+    assert DataSet(OBSERVED_RUN_OUT, "block", np.zeros(3)).name == "block"
 
 
 @pytest.mark.parametrize(

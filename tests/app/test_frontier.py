@@ -148,7 +148,7 @@ def check_advice(words: str, other: Evaluation, chosen: Evaluation) -> None:
     else:
         states = f"{other.targets}, and those of the latter {chosen.targets}"
         assert words == f", but its targets are {states}"
-        assert findings.RANK[other.targets] > findings.RANK[chosen.targets]
+        assert findings.TARGET_RANK[other.targets] > findings.TARGET_RANK[chosen.targets]
 
 
 def check_rest(line: str, done: DesignStudy, chosen: Evaluation) -> None:

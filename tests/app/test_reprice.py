@@ -81,7 +81,9 @@ def anew(site: Site, layout: rigdda.Layout, drawn: list[tuple[int, str]]) -> lis
 def from_scratch(site: Site, problem: DesignProblem, kept: archive.Archive) -> list[Evaluation]:
     """Return the evaluations of the verified layouts, with every release simulated anew."""
     counts = DesignProblem(kept.site).nothing.reach
-    seeds = {n: range(ensemble.SEEDS, ensemble.SEEDS + counts[n].releases) for n in counts}
+    seeds = {
+        n: range(ensemble.FIRST_SEED, ensemble.FIRST_SEED + counts[n].releases) for n in counts
+    }
     bare = anew(site, (), [(seed, name) for name in site.event_names for seed in seeds[name]])
     facts = ensemble._facts(site, bare)
     nothing = judge(site, (), bare, {}, {})
@@ -278,12 +280,12 @@ def test_a_key_that_is_set_twice_is_refused(designed: Path, tmp_path: Path) -> N
 
 
 def test_a_folder_without_a_design_is_refused(tmp_path: Path, designed: Path) -> None:
-    assert archive.FILE in refused("reprice", tmp_path / "none", folder=tmp_path)
-    whole = (designed / archive.FILE).read_bytes()
+    assert archive.ARCHIVE_FILE in refused("reprice", tmp_path / "none", folder=tmp_path)
+    whole = (designed / archive.ARCHIVE_FILE).read_bytes()
     for i, content in enumerate((b"", whole[:1000], gzip.compress(b"\x80"), b"x" * 99)):
         folder = tmp_path / str(i)
         folder.mkdir()
-        (folder / archive.FILE).write_bytes(content)
+        (folder / archive.ARCHIVE_FILE).write_bytes(content)
         line = refused("reprice", folder, folder=tmp_path)
         assert "damaged or of another version" in line
 
@@ -295,8 +297,10 @@ def test_the_folder_of_the_design_is_not_overwritten(designed: Path, tmp_path: P
 
 def test_an_archive_is_the_same_after_writing(designed: Path, tmp_path: Path) -> None:
     kept = archive.read(designed)
-    archive.write(tmp_path / archive.FILE, kept)
-    assert (tmp_path / archive.FILE).read_bytes() == (designed / archive.FILE).read_bytes()
+    archive.write(tmp_path / archive.ARCHIVE_FILE, kept)
+    assert (tmp_path / archive.ARCHIVE_FILE).read_bytes() == (
+        designed / archive.ARCHIVE_FILE
+    ).read_bytes()
     with pytest.raises(BadInput, match="completed"):
         archive.read(tmp_path / "other")
 

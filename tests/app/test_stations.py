@@ -17,13 +17,13 @@ from scipy.stats import binom
 from rigdda import Fence, Site
 from rigdda.app.reports import stations
 from rigdda.app.reports.simulation_report import TABLES
-from rigdda.app.reports.stations import LEVELS, QUANTITIES, Passing
+from rigdda.app.reports.stations import QUANTILE_LEVELS, QUANTITIES, Passing
 from rigdda.envs.intervals import mid_p
 from rigdda.envs.quantiles import quantiles
 from rigdda.passages import PASSAGE, STATES, STOP, Passages, passages
 
 RELEASES = 120
-NUMBERS = ("mean", *(f"q{100 * level:g}" for level in LEVELS))
+NUMBERS = ("mean", *(f"q{100 * level:g}" for level in QUANTILE_LEVELS))
 
 
 @pytest.fixture(scope="module")
@@ -75,10 +75,10 @@ def test_the_tables_equal_a_computation_by_hand(simulated: tuple[Path, str]) -> 
     releases = rows(folder / "outcomes.csv")
     checked = 0
     for row in rows(folder / "stations.csv"):
-        if row["quantity"] == stations.RATE:
+        if row["quantity"] == stations.PASSING_RATE:
             continue
         here = [p for p in raw if p["x_m"] == row["x_m"]]
-        own = [p for p in here if row["event"] in (p["event"], stations.ALL)]
+        own = [p for p in here if row["event"] in (p["event"], stations.ALL_EVENTS)]
         assert int(row["n"]) == len(own)
         if not own:
             assert row["note"] == "no block passes" and row["mean"] == ""
@@ -86,7 +86,7 @@ def test_the_tables_equal_a_computation_by_hand(simulated: tuple[Path, str]) -> 
         sample, weights = [values(p)[row["quantity"]] for p in own], weighted(site, own, releases)
         mean = sum(float(w) * v for w, v in zip(weights, sample, strict=True)) / float(sum(weights))
         assert float(row["mean"]) == pytest.approx(mean, rel=1e-12)
-        for level in LEVELS:
+        for level in QUANTILE_LEVELS:
             hand = quantile(sample, weights, level)
             assert float(row[f"q{100 * level:g}"]) == hand
         checked += 1
@@ -105,7 +105,7 @@ def test_intervals_of_single_blocks_are_order_statistics(simulated: tuple[Path, 
         for row in rows(folder / "stations.csv")
         if (row["x_m"], row["event"], row["quantity"]) == ("3.5", "small, crest", "velocity")
     )
-    for level, name in zip(LEVELS, NUMBERS[1:], strict=True):
+    for level, name in zip(QUANTILE_LEVELS, NUMBERS[1:], strict=True):
         low, high = int(binom.ppf(0.025, n, level)), int(binom.ppf(0.975, n, level)) + 1
         assert row[f"{name}_low"] == (str(ordered[low - 1]) if low >= 1 else "")
         assert row[f"{name}_high"] == (str(ordered[high - 1]) if high <= n else "")
@@ -119,7 +119,7 @@ def test_passing_rates_are_rates_times_the_share_of_releases(simulated: tuple[Pa
     table = {
         row["event"]: row
         for row in rows(folder / "stations.csv")
-        if (row["quantity"], row["x_m"]) == (stations.RATE, "8.0")
+        if (row["quantity"], row["x_m"]) == (stations.PASSING_RATE, "8.0")
     }
     for event in site.events:
         n = sum(r["event"] == event.name for r in releases)
@@ -134,7 +134,7 @@ def test_passing_rates_are_rates_times_the_share_of_releases(simulated: tuple[Pa
         assert found == pytest.approx([often, low, high])
         assert table[event.name]["unit"] == "1/year per 100 m"
         total += often
-    assert float(table[stations.ALL]["mean"]) == pytest.approx(total)
+    assert float(table[stations.ALL_EVENTS]["mean"]) == pytest.approx(total)
 
 
 def test_parquet_equals_csv(simulated: tuple[Path, str]) -> None:
@@ -156,7 +156,7 @@ def test_pictures_are_there_and_the_printed_figures_are_those_of_the_table(
     (row,) = (
         row
         for row in rows(folder / "stations.csv")
-        if (row["x_m"], row["event"], row["quantity"]) == ("8.0", stations.ALL, "velocity")
+        if (row["x_m"], row["event"], row["quantity"]) == ("8.0", stations.ALL_EVENTS, "velocity")
     )
     assert f"at 8 m {row['n']} blocks pass" in words
     (line,) = re_lines(words.split("at 8 m ")[1], "velocity [m/s]")
@@ -189,9 +189,9 @@ def test_the_run_out_of_the_rock_is_what_the_stops_give(simulated: tuple[Path, s
     folder, words = simulated
     site, stops = Site.load("verge"), rows(folder / "stops.csv")
     releases = rows(folder / "outcomes.csv")
-    assert {row["event"] for row in rows(folder / "stopping.csv")} > {"block", stations.ALL}
+    assert {row["event"] for row in rows(folder / "stopping.csv")} > {"block", stations.ALL_EVENTS}
     for row in rows(folder / "stopping.csv"):
-        own = [s for s in stops if row["event"] in (s["event"], stations.ALL)]
+        own = [s for s in stops if row["event"] in (s["event"], stations.ALL_EVENTS)]
         if not own:
             continue
         each = weighted(site, own, releases)
@@ -202,7 +202,7 @@ def test_the_run_out_of_the_rock_is_what_the_stops_give(simulated: tuple[Path, s
         assert int(row["n"]) == len(own)
         assert row["x_m_high"] == "" or float(row["x_m_high"]) >= hand
         assert row["bound"] == "" and {s["state"] for s in own} == {"at rest"}
-    assert (row["event"], row["share"]) == (stations.ALL, "0.95")
+    assert (row["event"], row["share"]) == (stations.ALL_EVENTS, "0.95")
     assert row["x_m_low"] != ""
     (line,) = re_lines(words, "run-out of 95 % of the rock [m]")
     assert f" {hand:.1f} " in line and "lower bound" not in words
@@ -241,9 +241,9 @@ def test_events_without_a_release_have_empty_rows_of_the_run_out(tmp_path: Path)
     table = stations.stopping(Passing.of(site, (), None, found))
     stations.write(tmp_path / "stopping", table)
     written = rows(tmp_path / "stopping.csv")
-    assert {row["event"] for row in written} == {*site.event_names, stations.ALL}
+    assert {row["event"] for row in written} == {*site.event_names, stations.ALL_EVENTS}
     for row in written:
-        drawn = row["event"] in ("block", stations.ALL)
+        drawn = row["event"] in ("block", stations.ALL_EVENTS)
         assert bool(row["x_m"]) == bool(row["chainage_m"]) == drawn
     assert stations.stopped(table[2:4]) == ("-", "-") and not stations.lower_bound(table[2:4])
 

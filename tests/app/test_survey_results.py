@@ -75,7 +75,7 @@ def test_without_an_origin_there_are_no_such_columns(bare: Site) -> None:
     passing = Passing.of(bare, (), "block", passages(bare, (), [(0, "block")], [20.0]))
     for rows in (stations.summary(passing, [0]), stations.run_out(passing)):
         assert not {"chainage_m", "elevation_m"} & set(rows[0])
-    assert stations.raw_fields(bare) == list(stations.RAW)
+    assert stations.raw_fields(bare) == list(stations.PASSAGE_COLUMNS)
     assert surveyed(bare, 20.0) == ""
     assert "survey" not in order(FENCE, bare)
 

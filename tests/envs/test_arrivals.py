@@ -14,8 +14,8 @@ import rigdda
 from rigdda import BadInput, Site
 from rigdda.app import cli
 from rigdda.envs import DesignProblem, with_release_rates
-from rigdda.envs.arrivals import ENOUGH, LEAST, MOST, release_rates
-from rigdda.envs.ensemble import SEEDS
+from rigdda.envs.arrivals import ENOUGH, LEAST_RELEASES, MOST_RELEASES, release_rates
+from rigdda.envs.ensemble import FIRST_SEED
 from rigdda.passages import passages
 
 
@@ -35,11 +35,11 @@ def site() -> Site:
 def test_the_rate_of_releases_is_that_of_arrivals_over_their_probability(site: Site) -> None:
     (rate,) = release_rates(site)
     n = rate.chance.releases
-    seeds = range(SEEDS, SEEDS + n)
+    seeds = range(FIRST_SEED, FIRST_SEED + n)
     reached = [rigdda.release(site, (), seed, "block")[1].reached for seed in seeds]
     p = sum(reached) / n
-    assert 0.0 < p < 1.0 and LEAST <= n <= MOST
-    assert n == MOST or ((1.0 - p) / (p * n)) ** 0.5 <= ENOUGH
+    assert 0.0 < p < 1.0 and LEAST_RELEASES <= n <= MOST_RELEASES
+    assert n == MOST_RELEASES or ((1.0 - p) / (p * n)) ** 0.5 <= ENOUGH
     assert (rate.event, rate.chance.probability) == ("block", p)
     assert rate.chance.low < p < rate.chance.high
     assert rate.arrivals == LIGHT.event("block").rate
@@ -90,7 +90,9 @@ def test_nothing_that_arrives_gives_no_rate(site: Site) -> None:
                                                    friction_deg=80.0)
                         for k, s in site.surfaces.items()}
     )  # fmt: skip
-    with pytest.raises(BadInput, match=rf"rate_of = 'arrival': give the rate .* none of {MOST:,}"):
+    with pytest.raises(
+        BadInput, match=rf"rate_of = 'arrival': give the rate .* none of {MOST_RELEASES:,}"
+    ):
         with_release_rates(far)
     with pytest.raises(BadInput, match=r"events.block.rate = 1000.*give a lower rate of arrivals"):
         with_release_rates(arriving(LIGHT, "block", rate=1000.0))

@@ -15,7 +15,7 @@ import rigdda.envs.repetition
 import rigdda.envs.replay_record
 from rigdda import BadInput, Corridor, CorridorSection, Ditch, Site
 from rigdda.envs import CorridorProblem
-from rigdda.envs.corridor_environment import FIELDS
+from rigdda.envs.corridor_environment import CORRIDOR_FIELDS
 
 NAMES = ("quick", "verge")
 
@@ -92,7 +92,7 @@ def test_copies_step_as_if_alone() -> None:
     alone = [gymnasium.make("rigdda/Corridor-v0", site=list(NAMES), releases=1) for _ in range(2)]
     starts = [env.reset(seed=7 + i)[0] for i, env in enumerate(alone)]
     actions = np.zeros((2, *alone[0].action_space.shape), dtype=np.float32) + 0.5
-    for name in FIELDS:
+    for name in CORRIDOR_FIELDS:
         assert (seen[name] == np.stack([start[name] for start in starts])).all()
     _, rewards, *_ = batch.step(actions)
     assert rewards.tolist() == [env.step(actions[i])[1] for i, env in enumerate(alone)]
@@ -100,11 +100,11 @@ def test_copies_step_as_if_alone() -> None:
 
 def test_every_entry_of_the_corridor_changes() -> None:
     env = make(site=["quick", "verge", "bench"], budget=(50.0, 500.0), flat=False)
-    seen = {name: [] for name in FIELDS}
+    seen = {name: [] for name in CORRIDOR_FIELDS}
     for seed in range(6):
         first, _ = env.reset(seed=seed)
         for now in (first, env.step(-np.ones(18))[0]):
-            for name in FIELDS:
+            for name in CORRIDOR_FIELDS:
                 seen[name].append(now[name])
     for name, values in seen.items():
         assert (np.ptp(np.stack(values), axis=0) > 0.0).all(), name

@@ -49,13 +49,13 @@ def test_stations_are_fixed_and_at_most_a_metre_apart(site: Site, found: DesignE
     assert found.stations[0] == zone.start and found.stations[-1] == zone.end
     assert np.diff(found.stations).max() <= 1.0
     long = msgspec.structs.replace(zone, end=zone.start + 1000.0)
-    assert len(stations(long)) == design_envelope.MOST
+    assert len(stations(long)) == design_envelope.MOST_STATIONS
 
 
 def test_a_characteristic_value_is_never_below_the_quantile_of_its_station(
     site: Site, found: DesignEnvelope
 ) -> None:
-    first = design_envelope.SEEDS + 3 * 2**20
+    first = design_envelope.FIRST_SEED + 3 * 2**20
     releases = [(first + i, "block") for i in range(BLOCKS)]
     raw = passages(site, (), releases, found.stations)
     for k, event in enumerate(found.events[0].speed):
@@ -67,7 +67,7 @@ def test_a_characteristic_value_is_never_below_the_quantile_of_its_station(
 
 
 def test_the_mass_is_that_of_whole_blocks(site: Site, found: DesignEnvelope) -> None:
-    first = design_envelope.SEEDS + 3 * 2**20
+    first = design_envelope.FIRST_SEED + 3 * 2**20
     blocks = [site.draw(first + i, "block").blocks[0] for i in range(BLOCKS)]
     masses = [block.density * abs(polygon_properties(block.vertices)[0]) ** 1.5 for block in blocks]
     assert found.events[0].mass == pytest.approx(np.quantile(masses, 0.95))

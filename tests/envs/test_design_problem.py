@@ -43,8 +43,8 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> None:
         folder = tmp_path_factory.mktemp("nothing")
         patch.setattr(site_store, "path_of", lambda name, key: folder / f"{name}-{key.hex()}")
         patch.setattr(ensemble, "memory", Memory(64))
-        patch.setattr(ensemble, "FIRST", 6)
-        patch.setattr(ensemble, "ALL", 60)
+        patch.setattr(ensemble, "FIRST_ROUND", 6)
+        patch.setattr(ensemble, "BOTH_ROUNDS", 60)
         yield
 
 
@@ -163,8 +163,8 @@ def test_releases_spread_over_events_and_a_part_of_them_too(problem: DesignProbl
     whole = problem.plan(range(400))
     facts = problem._known.facts
     for name, share in shares.items():
-        time = facts[name].blocks ** ensemble.CROWDED  # less of what takes longer
-        assert share >= 0.9 * ensemble.FLOOR / 4 * 2.0 / (1.0 + time)
+        time = facts[name].blocks ** ensemble.BLOCK_COST  # less of what takes longer
+        assert share >= 0.9 * ensemble.LEAST_EVENT_SHARE / 4 * 2.0 / (1.0 + time)
         assert whole.count(name) == pytest.approx(400 * share, abs=2.5)
     assert problem.plan(range(20)) == whole[:20]
     assert min(Counter(problem.plan(range(8))).values()) == 2
@@ -301,7 +301,7 @@ def test_without_prices_the_reward_is_the_share_of_debris_kept_off() -> None:
 def test_the_cost_of_nothing_is_found_again_by_another_process(tmp_path: Path) -> None:
     program = (
         "import warnings; from rigdda.envs import DesignProblem, ensemble, site_store\n"
-        "warnings.simplefilter('ignore'); ensemble.FIRST, ensemble.ALL = 2, 8\n"
+        "warnings.simplefilter('ignore'); ensemble.FIRST_ROUND, ensemble.BOTH_ROUNDS = 2, 8\n"
         "where = site_store.path_of('ensemble', b'').parent\n"
         "print(DesignProblem('verge').nothing.simulated, where.exists())\n"
         "ensemble._simulate = None\n"

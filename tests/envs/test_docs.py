@@ -22,7 +22,7 @@ SIZES = {0: "size of all slots", -1: "`max_barriers`"}
     [
         ("BarrierDesign-v0", FIELDS),
         ("BarrierPlacement-v0", LAYOUT_FIELDS),
-        ("Corridor-v0", corridor_environment.FIELDS),
+        ("Corridor-v0", corridor_environment.CORRIDOR_FIELDS),
     ],
 )
 def test_every_array_is_documented(page: str, fields: dict) -> None:

@@ -12,7 +12,14 @@ from cases import FREE, HARMLESS, cut
 import rigdda
 from rigdda import Site, sites
 from rigdda.envs import DesignProblem
-from rigdda.envs.envelope import FIRST, STATIONS, barrier_free, envelope, largest, stations
+from rigdda.envs.envelope import (
+    FIRST_SEED,
+    ZONE_STATIONS,
+    barrier_free,
+    envelope,
+    largest,
+    stations,
+)
 from rigdda.envs.environments import SCORED_SEEDS, BarrierDesign, BarrierEnv, BarrierPlacement
 from rigdda.envs.observation import BOUND, FIELDS, LAYOUT_FIELDS, observe, space
 
@@ -58,20 +65,20 @@ def test_the_site_is_told() -> None:
 def test_what_falls_without_barriers_is_told() -> None:
     """By its definition, from the runs themselves."""
     lines, seen = stations(CUT), envelope(CUT)
-    often, energies = np.zeros((2, STATIONS)), [[[] for _ in lines] for _ in range(2)]
+    often, energies = np.zeros((2, ZONE_STATIONS)), [[[] for _ in lines] for _ in range(2)]
     for event in CUT.events:
         group = int(largest(CUT, event.name) > 1)
         count = max(2, 16 // largest(CUT, event.name))
-        for seed in range(FIRST, FIRST + count):
+        for seed in range(FIRST_SEED, FIRST_SEED + count):
             scene = CUT.realise((), seed, event.name)
             run = rigdda.Simulation(scene, CUT.settings(scene), lines.tolist()).run(8.0)
-            for k in range(STATIONS):
+            for k in range(ZONE_STATIONS):
                 passed = [e["energy"] for e in run.events if e["target"] == k and e["kind"] == 1]
                 often[group, k] += (len(passed) > 0) * event.rate / count
                 energies[group][k] += passed
     np.testing.assert_allclose(seen.often, often, rtol=1e-9, atol=1e-12)
     for group in range(2):
-        for k in range(STATIONS):
+        for k in range(ZONE_STATIONS):
             assert seen.energy[group, k] in (energies[group][k] or [0.0])
     assert seen.deposit.sum() == pytest.approx(1.0)
     told = observe(DesignProblem(CUT))
@@ -81,7 +88,7 @@ def test_what_falls_without_barriers_is_told() -> None:
 def test_envelopes_are_simulated_once_and_on_seeds_that_are_not_scored(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    assert FIRST >= SCORED_SEEDS
+    assert FIRST_SEED >= SCORED_SEEDS
     first = envelope(CUT)
     monkeypatch.setattr(Site, "realise", None)
     assert envelope(msgspec.structs.replace(CUT)) is first

@@ -48,8 +48,8 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user's cache of its own, and no file of the package; few releases tell of a site."""
     monkeypatch.setattr(site_store, "cache_directory", lambda: tmp_path / "cache" / "kernels")
     monkeypatch.setattr(site_store, "SHIPPED", tmp_path / "shipped.xz")
-    monkeypatch.setattr(ensemble, "FIRST", 4)
-    monkeypatch.setattr(ensemble, "ALL", 40)
+    monkeypatch.setattr(ensemble, "FIRST_ROUND", 4)
+    monkeypatch.setattr(ensemble, "BOTH_ROUNDS", 40)
     forget(monkeypatch)
     yield tmp_path / "cache"
     site_store._shipped.cache_clear()
@@ -128,7 +128,7 @@ def test_a_first_reset_reads_what_ships(cache: Path, monkeypatch: pytest.MonkeyP
     no_simulation(monkeypatch)
     again, seen_again = known()
     assert again == first and same(seen_again, seen)
-    monkeypatch.setattr(BarrierPlacement, "looks", False)
+    monkeypatch.setattr(BarrierPlacement, "observes_layout", False)
     BarrierPlacement(CUT, releases=1).draw(seed=0)
     assert not [*cache.rglob("*.msgpack")]
 
@@ -154,9 +154,9 @@ def test_what_ships_is_ignored_unless_it_is_sound_and_of_this_version(
 
 
 def test_what_is_stored_is_of_one_version_of_the_mechanics(monkeypatch: pytest.MonkeyPatch) -> None:
-    path = site_store.path_of(ensemble.NAME, b"key")
+    path = site_store.path_of(ensemble.STORED_AS, b"key")
     monkeypatch.setattr(site_store, "MECHANICS", "another")
-    other = site_store.path_of(ensemble.NAME, b"key")
+    other = site_store.path_of(ensemble.STORED_AS, b"key")
     assert path.name == other.name and path.parent != other.parent
 
 
@@ -166,10 +166,10 @@ def test_values_that_are_computed_again_are_not_read(
     ship(cache)
     forget(monkeypatch)
     key = DesignProblem(CUT).key
-    assert site_store.read(ensemble.NAME, key, ensemble.Ensemble) is not None
+    assert site_store.read(ensemble.STORED_AS, key, ensemble.Ensemble) is not None
     with site_store.ignored():
-        assert site_store.read(ensemble.NAME, key, ensemble.Ensemble) is None
-    assert site_store.read(ensemble.NAME, key, ensemble.Ensemble) is not None
+        assert site_store.read(ensemble.STORED_AS, key, ensemble.Ensemble) is None
+    assert site_store.read(ensemble.STORED_AS, key, ensemble.Ensemble) is not None
 
 
 READER = """
@@ -193,7 +193,7 @@ def test_another_numba_docstring_and_description_find_what_ships(tmp_path: Path)
     site = rigdda.Site.load("quick")
     key = DesignProblem(site).key
     found = ensemble.of(site, key)
-    packed = site_store.pack({f"{ensemble.NAME}-{key.hex()}": found})
+    packed = site_store.pack({f"{ensemble.STORED_AS}-{key.hex()}": found})
     (whole / "envs" / "site_store.msgpack.xz").write_bytes(packed)
     for name in ("dynamics/step.py", "envs/cost.py", "releases.py"):
         text = (whole / name).read_text()
@@ -213,7 +213,7 @@ def test_another_numba_docstring_and_description_find_what_ships(tmp_path: Path)
 
 
 def test_texts_of_a_site_are_not_part_of_its_key() -> None:
-    texts = dict.fromkeys(outcome_cache.TEXTS, "other")
+    texts = dict.fromkeys(outcome_cache.DESCRIPTIVE_FIELDS, "other")
     other = msgspec.structs.replace(CUT, **texts)
     assert outcome_cache.fingerprint(other) == outcome_cache.fingerprint(CUT)
     prices = msgspec.structs.replace(CUT.prices, removal=2.0 * CUT.prices.removal)
@@ -257,7 +257,7 @@ def test_known_sites_are_kept_while_the_mechanics_stay(
     assert first.current and len(first.values) == 2
     assert run().exit_code == 0 and said[0] == "quick is the same"
     assert site_store.unpack(out.read_bytes()).values == first.values
-    monkeypatch.setattr(ensemble, "ALL", 44)
+    monkeypatch.setattr(ensemble, "BOTH_ROUNDS", 44)
     changed = run()
     assert changed.exit_code == 1 and "change rigdda.MECHANICS" in changed.output
     monkeypatch.setattr(site_store, "MECHANICS", "another")

@@ -157,7 +157,7 @@ def test_blocks_of_a_source_do_not_overlap():
     with pytest.raises(BadInput) as caught:
         columns(blocks=(*blocks[:3], shifted, *blocks[4:]))
     assert caught.value.field == "sources.mass.blocks[3]"
-    assert "in block 2" in caught.value.mend
+    assert "in block 2" in caught.value.hint
 
 
 def test_blocks_of_a_source_are_out_of_the_ground():

@@ -231,6 +231,6 @@ def test_bad_input(case, tmp_path):
     assert isinstance(error, ValueError)
     assert error.field == field
     assert text.startswith(f"{field} = ")
-    assert text.endswith(f": {error.mend}")
-    assert len(error.mend) > 5
+    assert text.endswith(f": {error.hint}")
+    assert len(error.hint) > 5
     assert "\n" not in text

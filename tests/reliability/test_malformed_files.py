@@ -261,13 +261,13 @@ def refusals(tmp_path: Path, capsys: pytest.CaptureFixture[str], count: int, see
             read(path)
         except BadInput as error:
             refused += 1
-            assert error.field and len(error.mend) > 5, str(error)
+            assert error.field and len(error.hint) > 5, str(error)
             assert "\n" not in str(error) and len(str(error)) < 700, str(error)
             if refused % 5 == 0:  # the command says the same
                 out = [] if name == "survey.csv" else ["--out", str(tmp_path / "out")]
                 assert cli.main([*command(str(path)), *out]) == 2
                 told = capsys.readouterr().err.strip()
-                assert told.count("\n") == 0 and error.mend[:20] in told, told
+                assert told.count("\n") == 0 and error.hint[:20] in told, told
         except Exception as error:
             raise AssertionError(f"{type(error)} of {path.read_bytes()!r}") from error
     assert not (tmp_path / "out").exists()

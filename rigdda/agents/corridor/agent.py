@@ -37,10 +37,10 @@ Floats = NDArray[np.float64]
 SPLIT = "train"
 """Split with the sites for training."""
 
-POINTS = 64
+MOST_POINTS = 64
 """Largest number of points of a `Prospect`."""
 
-FILE = Path(__file__).parent / "prospect.safetensors"
+PROSPECT_FILE = Path(__file__).parent / "prospect.safetensors"
 """The prospect that ships with the package."""
 
 
@@ -149,8 +149,8 @@ def prospect(offers: Sequence[Offer], risks: Sequence[float]) -> Prospect:
     steps = increments(Options(np.ones(len(offers)), costs, zeros, values, zeros))
     money = np.cumsum([0.0, *(step.cost for step in steps)]) / len(offers)
     gain = np.cumsum([0.0, *(step.saving for step in steps)]) / math.fsum(risks)
-    if len(money) > POINTS:  # the early ones change most
-        kept = np.unique(np.round((len(money) - 1) * np.linspace(0.0, 1.0, POINTS) ** 2))
+    if len(money) > MOST_POINTS:  # the early ones change most
+        kept = np.unique(np.round((len(money) - 1) * np.linspace(0.0, 1.0, MOST_POINTS) ** 2))
         money, gain = money[kept.astype(int)], gain[kept.astype(int)]
     return Prospect(money, gain)
 
@@ -242,4 +242,4 @@ class CorridorAgent:
 @lru_cache(maxsize=1)
 def shipped() -> Prospect:
     """Return the prospect that ships with the package."""
-    return Prospect.load(FILE)
+    return Prospect.load(PROSPECT_FILE)

@@ -17,7 +17,7 @@ from scipy.special import ndtr
 
 Floats = NDArray[np.float64]
 
-BATCH = 25
+BATCH_RELEASES = 25
 """Number of releases of a batch."""
 
 LEAST_ERROR = 1e-12
@@ -55,7 +55,7 @@ class Estimates:
         It is the sum over the prices of capital [1/year], in EUR/year.
         """
         now = self.variance / self.releases
-        after = self.variance / (self.releases + BATCH)
+        after = self.variance / (self.releases + BATCH_RELEASES)
         total = np.zeros(len(self.value))
         for price in prices:
             goal = self.value + price * self.cost
@@ -105,13 +105,13 @@ def batches(
     worth = [section.worth(prices) for section in sections]
     most = np.array([own.max() for own in worth])
     out: dict[tuple[int, int], int] = {}
-    for _ in range(releases // BATCH):
+    for _ in range(releases // BATCH_RELEASES):
         s = int(np.argmax(most))
         if most[s] <= 0.0:
             break
         k = int(np.argmax(worth[s]))
         out[s, k] = out.get((s, k), 0) + 1
-        sections[s].releases[k] += BATCH
+        sections[s].releases[k] += BATCH_RELEASES
         worth[s] = sections[s].worth(prices)
         most[s] = worth[s].max()
     return out

@@ -24,7 +24,7 @@ import numpy as np
 
 from rigdda import MECHANICS, BadInput, Corridor, Layout, __version__, check, distribution
 from rigdda.agents.corridor import allocation, programme
-from rigdda.agents.corridor.programme import METHODS, Choice, Increment, Options
+from rigdda.agents.corridor.programme import SIMPLE_METHODS, Choice, Increment, Options
 from rigdda.agents.designers import front
 from rigdda.agents.designers.protocol import Entry, release_seeds
 from rigdda.agents.designers.store import Store
@@ -37,17 +37,17 @@ from rigdda.files import atomic
 
 Floats = np.ndarray
 
-SEARCH, CHOICE = 0.5, 0.3
+SEARCH_SHARE, CHOICE_SHARE = 0.5, 0.3
 """Shares of the releases for the search of the fronts and for the choice [-]. The rest is for the
 report."""
 
-FEWEST, FIRST = 10, 30
+LEAST_PER_LAYOUT, USUAL_PER_LAYOUT = 10, 30
 """Least and usual number of releases of each layout before releases go to those at the margin."""
 
 ROUNDS = 12
 """Number of rounds after which the shadow prices are computed again."""
 
-LEAST, MOST = 100, 5_000
+LEAST_REPORTED, MOST_REPORTED = 100, 5_000
 """Least and largest number of releases for the report of a layout."""
 
 SCENARIOS = 400
@@ -259,7 +259,7 @@ class Planner:
 
     def _search(self) -> None:
         """Search the front of every section."""
-        budget = int(SEARCH * self.releases)
+        budget = int(SEARCH_SHARE * self.releases)
         asks = [(problem, budget, self._seed(s)) for s, problem in enumerate(self.problem.problems)]
         own = [(p.key.hex(), p.kinds, p.max_barriers, *ask) for p, *ask in asks]
         files = [self._file("front", *values) for values in own]
@@ -317,19 +317,19 @@ class Planner:
 
     def compare(self) -> None:
         """Evaluate the options for the choice: evenly, or where it changes the choice."""
-        whole = int(CHOICE * self.releases * len(self.fronts))
+        whole = int(CHOICE_SHARE * self.releases * len(self.fronts))
         built = [(s, k) for s, own in enumerate(self.fronts) for k, o in enumerate(own) if o.layout]
         for s, options in enumerate(self.fronts):
             options[0].batches.append(self.problem.problems[s].nothing)
-        each = max(FEWEST, whole // max(1, len(built)))
-        first = max(FEWEST, min(FIRST, each // 2)) if self.margin else each
+        each = max(LEAST_PER_LAYOUT, whole // max(1, len(built)))
+        first = max(LEAST_PER_LAYOUT, min(USUAL_PER_LAYOUT, each // 2)) if self.margin else each
         self._add([(s, k, first) for s, k in built])
         spent = first * len(built)
         for done in range(ROUNDS if self.margin else 0):
             counts = allocation.batches(
                 self.estimates(), self._prices(), whole * (done + 1) // ROUNDS - spent
             )
-            wanted = [(s, k, n * allocation.BATCH) for (s, k), n in counts.items()]
+            wanted = [(s, k, n * allocation.BATCH_RELEASES) for (s, k), n in counts.items()]
             self._add(wanted)
             spent += sum(count for _, _, count in wanted)
 
@@ -373,7 +373,7 @@ class Planner:
         for budget in budgets:
             self._tick(self.used, "choosing")
             best = programme.optimum(options, budget, corridor.yearly_budget, scenarios)
-            others = {name: method(options, budget) for name, method in METHODS.items()}
+            others = {name: method(options, budget) for name, method in SIMPLE_METHODS.items()}
             choices.append({OPTIMUM: best, **others})
         self._report({(s, k) for own in choices for c in own.values() for s, k in enumerate(c)})
         plans = []
@@ -383,7 +383,7 @@ class Planner:
                 BudgetPlan(
                     budget=budget,
                     evaluation=self._judged(best),
-                    methods={name: self._judged(own[name]) for name in METHODS},
+                    methods={name: self._judged(own[name]) for name in SIMPLE_METHODS},
                     shadow_price=programme.shadow_price(options, budget),
                     following=_following(options, best),
                     missed=tuple(
@@ -398,9 +398,9 @@ class Planner:
     def _report(self, chosen: set[tuple[int, int]]) -> None:
         """Evaluate chosen options on releases that did not affect any choice."""
         built = sorted((s, k) for s, k in chosen if k > 0)
-        share = 1.0 - SEARCH - CHOICE
+        share = 1.0 - SEARCH_SHARE - CHOICE_SHARE
         each = int(share * self.releases * len(self.fronts) / max(1, len(built)))
-        count = min(MOST, max(LEAST, each))
+        count = min(MOST_REPORTED, max(LEAST_REPORTED, each))
         found = self.evaluate("report", [(s, k, count) for s, k in built])
         for (s, k), evaluation in zip(built, found, strict=True):
             self.fronts[s][k].report = evaluation

@@ -34,10 +34,10 @@ Floats = NDArray[np.float64]
 Choice = tuple[int, ...]
 """Index of the chosen option of each section."""
 
-GAP = 1e-6
+OPTIMALITY_GAP = 1e-6
 """Relative optimality gap of the integer programme [-]."""
 
-ROUNDING = 1e-9
+BUDGET_ROUNDING = 1e-9
 """Relative excess of a budget that is attributed to rounding [-]."""
 
 
@@ -131,9 +131,9 @@ def optimum(
         return sum(own @ x for own, x in zip(table, chosen, strict=True))
 
     limits = [cp.sum(x) == 1 for x in chosen]
-    limits.append(total(options.costs) <= budget * (1.0 + ROUNDING))
+    limits.append(total(options.costs) <= budget * (1.0 + BUDGET_ROUNDING))
     if yearly is not None:
-        limits.append(total(options.annual) <= yearly * (1.0 + ROUNDING))
+        limits.append(total(options.annual) <= yearly * (1.0 + BUDGET_ROUNDING))
     if any(own.any() for own in options.missed):
         least = _solve(cp.Problem(cp.Minimize(total(options.missed)), limits))
         limits.append(total(options.missed) <= least + 1e-6)
@@ -154,7 +154,7 @@ def _solve(problem: cp.Problem) -> float:
     import cvxpy as cp
 
     try:
-        value = problem.solve(solver=cp.HIGHS, mip_rel_gap=GAP)
+        value = problem.solve(solver=cp.HIGHS, mip_rel_gap=OPTIMALITY_GAP)
     except cp.SolverError as error:
         raise Error(f"the integer programme of the corridor failed: {error}") from None
     if not np.isfinite(value):
@@ -172,7 +172,7 @@ def shadow_price(options: Options, budget: float) -> float:
     left = budget
     for step in steps:
         left -= step.cost
-        if left < -ROUNDING * budget:
+        if left < -BUDGET_ROUNDING * budget:
             return step.saving / step.cost
     return 0.0
 
@@ -242,7 +242,7 @@ def by_ratio(options: Options, budget: float) -> Choice:
     for step in increments(options):
         if step.section in ended:
             continue
-        if step.cost <= left * (1.0 + ROUNDING):
+        if step.cost <= left * (1.0 + BUDGET_ROUNDING):
             choice[step.section] = step.after
             left -= step.cost
         else:
@@ -271,11 +271,11 @@ def worst_first(options: Options, budget: float) -> Choice:
 
 def _best(options: Options, s: int, money: float) -> int:
     """Return the option of a section with the least total cost that an amount of money allows."""
-    within = np.flatnonzero(options.costs[s] <= money * (1.0 + ROUNDING))
+    within = np.flatnonzero(options.costs[s] <= money * (1.0 + BUDGET_ROUNDING))
     return int(within[np.lexsort((options.values[s][within], options.missed[s][within]))[0]])
 
 
-METHODS = {
+SIMPLE_METHODS = {
     "same money per metre": same_money,
     "worst section first": worst_first,
     "saving per cost": by_ratio,

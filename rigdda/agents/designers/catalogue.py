@@ -35,9 +35,9 @@ from rigdda.geometry import polygon_properties
 Floats = NDArray[np.float64]
 
 
-RELEASES = 60
+ENSEMBLE_RELEASES = 60
 """Number of releases of an event in an ensemble; three of them exceed the 95 % quantile."""
-SHARE = 16
+ENSEMBLE_DIVISOR = 16
 """The ensemble uses at most this fraction (1 / SHARE) of a budget."""
 
 CROSSING = np.dtype(
@@ -104,8 +104,8 @@ class CrossingEnsemble:
 def ensemble_seeds(site: Site, seed: int, simulations: int) -> dict[str, tuple[int, ...]]:
     """Return the release seeds of an ensemble by event for a search with a given budget."""
     names = site.event_names
-    each = min(RELEASES, max(1, simulations // (SHARE * len(names))))
-    few = names[: max(1, simulations // SHARE)]
+    each = min(ENSEMBLE_RELEASES, max(1, simulations // (ENSEMBLE_DIVISOR * len(names))))
+    few = names[: max(1, simulations // ENSEMBLE_DIVISOR)]
     return {name: release_seeds("ensemble", seed, each) for name in few}
 
 
@@ -338,8 +338,8 @@ class Effects:
         harms: Any = self.site.consequences.harm(volume, True)  # type: ignore[arg-type]  # by element
         traffic, width = self.site.traffic, self.ensemble.width
         if traffic is not None:
-            toll = traffic.toll(True, True, width, volume, self._energy)
-            harms = harms + traffic.price(toll.fatalities)
+            expected = traffic.consequences(True, True, width, volume, self._energy)
+            harms = harms + traffic.price(expected.fatalities)
         return np.where(volume > 0.0, harms, 0.0)
 
 

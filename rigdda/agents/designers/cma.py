@@ -23,7 +23,7 @@ from rigdda.agents.designers.protocol import (
 )
 from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem
-from rigdda.envs.encoding import NUMBERS, slot_size
+from rigdda.envs.encoding import SLOT_NUMBERS, slot_size
 
 Floats = NDArray[np.float64]
 
@@ -94,5 +94,5 @@ def _centre(problem: DesignProblem, layout: Layout, rng: np.random.Generator) ->
     empty[:, 0] = VERGE
     empty[:, 1:] = rng.uniform(-1.0, 1.0, empty[:, 1:].shape)
     slots[: len(layout), 0] = PRESENT
-    slots[:, NUMBERS:] *= 0.5  # smaller scores, so that other kinds are tried as well
+    slots[:, SLOT_NUMBERS:] *= 0.5  # smaller scores, so that other kinds are tried as well
     return vector

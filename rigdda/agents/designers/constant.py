@@ -9,7 +9,7 @@ from __future__ import annotations
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Layout, Wall
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress
-from rigdda.agents.designers.rule import RELEASES
+from rigdda.agents.designers.rule import UNSEARCHED_RELEASES
 from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem
 
@@ -47,7 +47,7 @@ def design(
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
     layout = constant(problem, Menu(problem))
-    evaluation = ledger.evaluate(layout, "report", min(RELEASES, ledger.left))
+    evaluation = ledger.evaluate(layout, "report", min(UNSEARCHED_RELEASES, ledger.left))
     return ledger.result(evaluation, "start")
 
 

@@ -38,7 +38,7 @@ from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, Pro
 from rigdda.agents.designers.rule import answer
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import FENCE_CLASSES
-from rigdda.barriers.base import MIN_GAP, STEP
+from rigdda.barriers.base import MIN_GAP, SIZE_STEP
 from rigdda.barriers.fence import CLASSES
 from rigdda.envs import DesignProblem
 
@@ -260,7 +260,7 @@ def _smaller(layout: Layout, lower: int, weaker: int) -> Layout:
         if isinstance(b, Fence) and b.energy_class is not None:
             name = CLASSES[max(0, CLASSES.index(b.energy_class) - weaker)]
             row = FENCE_CLASSES[name]
-            tall = min(max(row.lowest, b.height - lower * STEP), row.height)
+            tall = min(max(row.lowest, b.height - lower * SIZE_STEP), row.height)
             b = Fence(b.x, tall, energy_class=name)
         out.append(b)
     return tuple(out)

@@ -37,7 +37,7 @@ ENSEMBLE, HEAVY_ENSEMBLE, HEAVY = 40, 6, 30
 """Releases of each event that a forecast without a search is made from, the same for events of more
 than `HEAVY` blocks, and this number of blocks. The value network is trained with them."""
 
-KINDS = ("fence", "ditch", "embankment", "gravity_wall", "mesh")
+FEATURE_KINDS = ("fence", "ditch", "embankment", "gravity_wall", "mesh")
 """Kinds of barrier that the features tell apart."""
 
 QUANTILE = 0.95
@@ -129,7 +129,7 @@ class Forecast:
                 rates = [(site.rate(n, (barrier,)), site.rate(n, ())) for n in site.event_names]
                 each = np.array([own / usual if usual > 0.0 else 1.0 for own, usual in rates])
                 factor = each[self.ensemble.event]
-            numbers = np.zeros((len(self._risk), BARRIER))
+            numbers = np.zeros((len(self._risk), BARRIER_FEATURES))
             return Effect(none, none, none, factor, mended, self._share(none, factor), numbers)
         k = int(np.argmin(np.abs(self.ensemble.stations - barrier.x)))
         table = self.effects.at(k)
@@ -246,12 +246,12 @@ class Forecast:
         for i in range(2):
             kind = order[i].kind if i < len(order) else ""
             kind = "gravity_wall" if kind == "wall" else kind
-            parts.append(np.tile([float(kind == name) for name in KINDS], (events, 1)))
+            parts.append(np.tile([float(kind == name) for name in FEATURE_KINDS], (events, 1)))
             if i < len(order):
                 own = self.effect(order[i])
                 parts += [own.share[:, None], own.numbers]
             else:
-                parts += [np.ones((events, 1)), np.zeros((events, BARRIER))]
+                parts += [np.ones((events, 1)), np.zeros((events, BARRIER_FEATURES))]
         return np.hstack([*parts, self._event_numbers])
 
     def remaining(self, layouts: Sequence[Layout]) -> Floats:
@@ -261,9 +261,9 @@ class Forecast:
         return self._value(features)
 
 
-BARRIER = 13
+BARRIER_FEATURES = 13
 """Number of features of one barrier besides its kind and its share."""
-WIDTH = 5 + 2 * (len(KINDS) + 1 + BARRIER) + 4
+LAYOUT_FEATURES = 5 + 2 * (len(FEATURE_KINDS) + 1 + BARRIER_FEATURES) + 4
 """Number of features of a layout for one event."""
 
 
@@ -307,7 +307,7 @@ class Value:
     Parameters
     ----------
     network : Network
-        Network with `WIDTH` features; the mean of its outputs is the prediction.
+        Network with `LAYOUT_FEATURES` features; the mean of its outputs is the prediction.
     """
 
     def __init__(self, network: Network):
@@ -318,7 +318,7 @@ class Value:
         return np.clip(self.network(features.astype(np.float32)).mean(axis=-1), 0.0, 1.2)
 
 
-FILE = Path(__file__).parent / "value.safetensors"
+NETWORK_FILE = Path(__file__).parent / "value.safetensors"
 """The network that ships with the package. It was trained with seed 1 and the method of
 `rigdda train --model value`, which was added later, so that its metadata contain only the seed."""
 
@@ -328,4 +328,4 @@ def value_network() -> Value:
     """Return the value network that ships with the package; the file is read once."""
     from rigdda.agents.policy import Network
 
-    return Value(Network.load(FILE))
+    return Value(Network.load(NETWORK_FILE))

@@ -24,7 +24,7 @@ PRICES = (0.0, 0.03, 0.1, 0.3, 1.0)
 """Prices of capital for which layouts are sought [1/year]. A price of 1 means that a euro is spent
 only if it saves a euro per year."""
 
-MOST = 12
+MOST_LAYOUTS = 12
 """Largest number of layouts of a front, including no barrier."""
 
 
@@ -35,7 +35,7 @@ def layouts(
     progress: Progress | None = None,
     store: Store | None = None,
 ) -> tuple[Layout, ...]:
-    """Return at most `MOST` layouts from the cheapest, no barrier, to that with the least Z.
+    """Return up to `MOST_LAYOUTS` layouts, from no barrier, the cheapest, to that of the least Z.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def layouts(
     surrogate = forecast_pool(ledger, menu, known)
     track.expect = surrogate.expect
     explore(track, surrogate, ledger.left, PRICES)
-    found = dict.fromkeys([(), *known, *front(surrogate, MOST - 1 - len(known))])
+    found = dict.fromkeys([(), *known, *front(surrogate, MOST_LAYOUTS - 1 - len(known))])
     return tuple(sorted(found, key=lambda layout: (problem.site.capital(layout), len(layout))))
 
 

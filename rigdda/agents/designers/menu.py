@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rigdda import Barrier, Layout, Mesh
 from rigdda.barriers import KINDS, Built, Removal
-from rigdda.barriers.base import NEAR
+from rigdda.barriers.base import BOUND_MARGIN
 from rigdda.envs import DesignProblem
 
 Floats = NDArray[np.float64]
@@ -183,10 +183,10 @@ def _place(problem: DesignProblem, barrier: Barrier) -> list[str]:
     zone, road = problem.zone, problem.site.road.start
     start, end = problem.place.works(barrier)
     found = []
-    if start - zone.start <= NEAR:
+    if start - zone.start <= BOUND_MARGIN:
         found.append("start of the zone")
-    if zone.end - end <= NEAR:
+    if zone.end - end <= BOUND_MARGIN:
         found.append("end of the zone")
-    if barrier.deflection > 0.0 and road - end - barrier.deflection <= NEAR:
+    if barrier.deflection > 0.0 and road - end - barrier.deflection <= BOUND_MARGIN:
         found.append("clearance to the road")
     return found

@@ -24,7 +24,7 @@ from rigdda import (
 from rigdda.agents.designers.frontier import Tally, TriedLayout, frontier
 from rigdda.agents.designers.menu import on_bound
 from rigdda.agents.designers.store import Store, StoredEvaluation
-from rigdda.agents.limits import RELEASES, SEED
+from rigdda.agents.limits import JOB_RELEASES, SEED
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.intervals import Estimate, Mean
 from rigdda.envs.problem import excess
@@ -34,7 +34,7 @@ STREAMS = ("search", "semifinal", "final", "report", "ensemble", "verification")
 again, to choose one of them; report: the chosen layout, for an unbiased evaluation; ensemble:
 releases without barriers that a designer analyses; verification: releases that no search uses."""
 
-CHOICE = "report"
+CHOICE_STREAM = "report"
 """Stream of the releases by which one of several verified layouts is chosen if a target is missed.
 No search is guided by it."""
 
@@ -63,7 +63,7 @@ def release_seeds(stream: str, seed: int, n: int, start: int = 0) -> tuple[int, 
     """
     tag = STREAMS.index(check.one_of("stream", stream, STREAMS))
     entropy = [check.integer("seed", seed, 0), tag]
-    count = check.integer("releases", n, 0, RELEASES)
+    count = check.integer("releases", n, 0, JOB_RELEASES)
     words = _distinct(np.random.SeedSequence(entropy), start + count)[start:]
     return tuple(word * len(STREAMS) + tag for word in words)
 
@@ -79,7 +79,7 @@ def _distinct(sequence: np.random.SeedSequence, n: int) -> list[int]:
     return list(words)
 
 
-MISSED = 1e6
+MISSED_TARGET_PENALTY = 1e6
 """Penalty of layouts that miss a target, which ranks them behind all others [EUR per m and
 year]."""
 
@@ -156,7 +156,7 @@ def value(problem: DesignProblem, evaluation: Evaluation) -> float:
     missed, objective = score(problem, evaluation)
     if missed <= 0.0:
         return objective
-    return max(objective, abs(problem.nothing.objective)) + MISSED * (1.0 + missed)
+    return max(objective, abs(problem.nothing.objective)) + MISSED_TARGET_PENALTY * (1.0 + missed)
 
 
 def ranked(problem: DesignProblem, evaluations: Sequence[Evaluation]) -> list[Evaluation]:
@@ -305,7 +305,7 @@ class Ledger:
         if not isinstance(problem, DesignProblem):
             raise BadInput("problem", problem, "give an envs.DesignProblem of the site")
         self.problem = problem
-        self.budget = check.integer("simulations", simulations, 2, RELEASES)
+        self.budget = check.integer("simulations", simulations, 2, JOB_RELEASES)
         self.seed = check.integer("seed", seed, 0, SEED)
         self.used = 0
         self.starts: set[Layout] = {()}
@@ -391,7 +391,7 @@ class Ledger:
 Choose = Callable[[DesignProblem, Sequence[Evaluation], int], list[Evaluation]]
 """Function that chooses at most a given number of evaluations."""
 
-MOST = 100
+MOST_SEARCHED = 100
 """Largest number of releases of a layout in a search. With this number, the standard error is
 larger than a difference of 5 % of the gain; the semifinals distinguish such layouts."""
 
@@ -400,9 +400,10 @@ larger than a difference of 5 % of the gain; the semifinals distinguish such lay
 class Plan:
     """Division of a budget: half for the search and half for the best layouts of the search.
 
-    The search evaluates 80 layouts, or more if each of them has `MOST` releases. An eighth of the
-    budget is for semifinals, a quarter for finals and an eighth for the report. There are no finals
-    if a finalist would have fewer than 16 releases. Then the best layout of the search is reported.
+    The search evaluates 80 layouts, or more if each of them has `MOST_SEARCHED` releases. An eighth
+    of the budget is for semifinals, a quarter for finals and an eighth for the report. There are no
+    finals if a finalist would have fewer than 16 releases. Then the best layout of the search is
+    reported.
     """
 
     releases: int
@@ -421,7 +422,7 @@ class Plan:
         semifinal = simulations // 8
         semifinalists = 3 * most if semifinal // (3 * most) >= 16 else 0
         return cls(
-            releases=min(MOST, max(1, simulations // 160)),
+            releases=min(MOST_SEARCHED, max(1, simulations // 160)),
             semifinalists=semifinalists,
             semifinal_releases=semifinal // semifinalists if semifinalists else 0,
             finalists=finalists,

@@ -11,9 +11,9 @@ The best layouts, the rule, the constant and no barrier race on separate release
 (`rigdda.agents.designers.racing`). The chosen layout is evaluated on further releases that did not
 affect the choice, so that its evaluation is unbiased.
 
-With a `precision`, the search stops before its budget is used up if another `STEP` releases are
-expected to lower Z by less than this share of it. The expectation is that of the Gaussian process
-over all results that the releases may have (knowledge gradient).
+With a `precision`, the search stops before its budget is used up if another `DECISION_STEP`
+releases are expected to lower Z by less than this share of it. The expectation is that of the
+Gaussian process over all results that the releases may have (knowledge gradient).
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from rigdda.agents.designers.store import Store
 from rigdda.agents.designers.surrogate import COMMON, Surrogate, expected_gain
 from rigdda.envs import DesignProblem
 
-EXPLORE, FINAL = 0.55, 0.28
+EXPLORE, FINAL_SHARE = 0.55, 0.28
 """Shares of the budget for the exploration and for the final [-]. The rest is for the ensemble and
 the report."""
-LEAST = 160
+LEAST_FINAL_BUDGET = 160
 """Least budget for a final. With less, the layouts with the best forecasts are compared at once."""
-EACH, FEWEST, MOST = 0.9, 10, 100
+EACH, LEAST_EXPLORED, MOST_EXPLORED = 0.9, 10, 100
 """Releases of a layout in the exploration over the square root of the budget, and their bounds."""
 BATCHES = 3
 """Number of batches."""
@@ -48,11 +48,11 @@ BOLD = 1.0
 """Number of standard deviations below the mean by which layouts are ranked for simulation [-]."""
 BEST_OF = 12
 """Number of single barriers of each kind with which combinations are formed."""
-FINALISTS = 10
+MOST_FINALISTS = 10
 """Largest number of layouts in the final besides no barrier, the rule and the constant."""
-STEP = 1000
+DECISION_STEP = 1000
 """Number of releases between two decisions whether the search stops."""
-REPORT = 300
+REPORT_RELEASES = 300
 """Number of releases for the evaluation of the chosen layout in a search that may stop early."""
 AS_GOOD = 0.005
 """Largest excess of Z over the best, divided by Z without barriers, with which a layout with fewer
@@ -76,8 +76,8 @@ def design(
     problem, simulations, seed, progress, store
         As for every designer, see `rigdda.agents.designers.protocol`.
     precision : float
-        Gain of another `STEP` releases below which the search stops, relative to Z [-]. With 0, or
-        if the problem has targets, the whole budget is used.
+        Gain of another `DECISION_STEP` releases below which the search stops, relative to Z [-].
+        With 0, or if the problem has targets, the whole budget is used.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def design(
     """
     check.number("precision", precision, 0.0, 1.0)
     ledger = Ledger(problem, simulations, seed, progress, store)
-    if simulations < LEAST:
+    if simulations < LEAST_FINAL_BUDGET:
         return search(ledger, offered(ledger))
     menu, track = Menu(problem), Track(ledger)
     known = unsearched(problem, menu)
@@ -94,9 +94,9 @@ def design(
     track.expect = surrogate.expect
     stops = precision if not surrogate.has_targets else 0.0
     explore(track, surrogate, int(EXPLORE * simulations), precision=stops)
-    ends = final(track, surrogate, known, int(FINAL * simulations), stops)
+    ends = final(track, surrogate, known, int(FINAL_SHARE * simulations), stops)
     chosen = choose(surrogate, ends, track.seen.get((), track.nothing))
-    report = min(REPORT, ledger.left) if stops > 0.0 else ledger.left
+    report = min(REPORT_RELEASES, ledger.left) if stops > 0.0 else ledger.left
     return ledger.result(ledger.evaluate(chosen, "report", report))
 
 
@@ -105,7 +105,7 @@ def final(
 ) -> list[Arm]:
     """Return the best of a race of the best layouts of the exploration, no barrier and `known`."""
     least = 3 * len(track.problem.site.events)
-    found = surrogate.best(min(FINALISTS, max(1, budget // (4 * least) - 1)))
+    found = surrogate.best(min(MOST_FINALISTS, max(1, budget // (4 * least) - 1)))
     finalists = list(dict.fromkeys([(), *found, *known]))
     first = max(least, budget // (3 * len(finalists)))
     if precision == 0.0:
@@ -116,12 +116,12 @@ def final(
         best = np.argsort(value, kind="stable")[: max(3, math.ceil(KEPT * len(arms)))]
         return [arms[i] for i in best.tolist()] if gain >= precision else []
 
-    first = min(first, max(least, STEP // len(finalists)))
-    return track.contest(finalists, budget, first, STEP, "final", contenders)
+    first = min(first, max(least, DECISION_STEP // len(finalists)))
+    return track.contest(finalists, budget, first, DECISION_STEP, "final", contenders)
 
 
 def state_of_final(surrogate: Surrogate, arms: Sequence[Arm], nothing: Arm) -> tuple[Floats, float]:
-    """Return Z of the arms of a final, and what another `STEP` releases are expected to gain.
+    """Return Z of the arms of a final, and the expected gain of another `DECISION_STEP` releases.
 
     Z is over the risk without barriers, and the gain is relative to the least Z [-]. The releases
     would be shared by all arms that were drawn equally often. `COMMON` of the variance is left out,
@@ -130,7 +130,7 @@ def state_of_final(surrogate: Surrogate, arms: Sequence[Arm], nothing: Arm) -> t
     value, variance = np.array([surrogate.joint(arm, nothing) for arm in arms]).T
     known = np.array([sum(map(len, arm.releases.values())) for arm in arms], dtype=np.float64)
     rivals = known == known.max()
-    more = np.where(rivals, STEP / rivals.sum(), 0.0)
+    more = np.where(rivals, DECISION_STEP / rivals.sum(), 0.0)
     learnt = np.sqrt((1.0 - COMMON) * variance * more / np.maximum(known + more, 1.0))
     annual = np.array([arm.annual / surrogate.worth for arm in arms])
     gain = expected_gain(value, np.diag(learnt), np.minimum(annual, value))
@@ -207,13 +207,17 @@ def explore(
         Prices of capital [1/year] for which promising layouts are sought in turn.
     precision : float
         Expected fall of Z by the next batch below which the exploration ends, relative to Z [-].
-        With 0, the budget is used up in `BATCHES` batches; otherwise a batch has `STEP` releases.
+        With 0, the budget is used up in `BATCHES` batches; otherwise a batch has `DECISION_STEP`
+        releases.
     """
     problem, ledger = track.problem, track.ledger
     end = ledger.left - budget
-    each = min(max(FEWEST, 2 * len(problem.site.events), int(EACH * math.sqrt(budget))), MOST)
+    each = min(
+        max(LEAST_EXPLORED, 2 * len(problem.site.events), int(EACH * math.sqrt(budget))),
+        MOST_EXPLORED,
+    )
     arms: list[Arm] = []
-    batches = BATCHES if precision == 0.0 else max(BATCHES, math.ceil(budget / STEP))
+    batches = BATCHES if precision == 0.0 else max(BATCHES, math.ceil(budget / DECISION_STEP))
     for i in range(batches):
         count = (ledger.left - end) // (each * (batches - i)) - 1
         if count < 1:

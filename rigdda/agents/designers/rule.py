@@ -32,10 +32,10 @@ COVERED = 0.95
 """Least share of the design blocks that reach the road which must cross the station of a fence [-].
 It prevents fences uphill of the sources."""
 
-RELEASES = 4000
+UNSEARCHED_RELEASES = 4000
 """Largest number of releases for the evaluation of a layout that needs no search."""
 
-NAME = "rule"
+RULE_NAME = "rule"
 """Name of the layout in tables if it satisfies the rule."""
 
 
@@ -101,7 +101,7 @@ def design(
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
     layout = answer(problem).layout
-    evaluation = ledger.evaluate(layout, "report", min(RELEASES, ledger.left))
+    evaluation = ledger.evaluate(layout, "report", min(UNSEARCHED_RELEASES, ledger.left))
     return ledger.result(evaluation, "start")
 
 
@@ -149,12 +149,14 @@ def judge(problem: DesignProblem, envelope: DesignEnvelope) -> RuleAnswer:
     best = choose(menu, asked)
     if best is not None:
         demand, fence = best
-        return RuleAnswer((fence,), NAME, "", FenceCheck.of(problem.site, fence, demand), envelope)
+        return RuleAnswer(
+            (fence,), RULE_NAME, "", FenceCheck.of(problem.site, fence, demand), envelope
+        )
     if problem.max_cost is not None:
         free = DesignProblem(problem.site, kinds=problem.kinds, zone=(zone.start, zone.end))
-        dear = choose(Menu(free), asked)
-        if dear is not None:
-            demand, fence = dear
+        costly = choose(Menu(free), asked)
+        if costly is not None:
+            demand, fence = costly
             price = f"{problem.site.capital((fence,)):,.0f} EUR/m, more than max_cost"
             reason = f"a fence that fits, {fence.label} at {fence.x:.1f} m, costs {price}"
             return _instead(

@@ -24,7 +24,7 @@ from rigdda.envs.intervals import estimate
 from rigdda.envs.outcome_cache import pack, unpack
 from rigdda.files import atomic
 
-FILE = "problem.json"
+PROBLEM_FILE = "problem.json"
 
 
 def record_problem(folder: Path, problem: DesignProblem, *files: str) -> None:
@@ -44,10 +44,10 @@ def record_problem(folder: Path, problem: DesignProblem, *files: str) -> None:
     BadInput
         If the folder contains results of another problem or of an unknown problem.
     """
-    file, asked = folder / FILE, identity(problem)
+    file, asked = folder / PROBLEM_FILE, identity(problem)
     if file.exists():
         known = _read(file)
-        other = _differ(known, asked) if known else f"{FILE}, which is damaged"
+        other = _differ(known, asked) if known else f"{PROBLEM_FILE}, which is damaged"
     else:
         found = [name for name in files if (folder / name).exists()]
         other = f"{found[0]} of an unknown problem" if found else ""
@@ -347,7 +347,7 @@ def _release(problem: DesignProblem, layout: Layout, outcome: Outcome) -> Releas
     failed = any(barrier.failed for barrier in outcome.barriers)
     killed = 0.0
     if problem.site.traffic is not None:
-        killed = float(problem.site.toll(layout, outcome).fatalities)
+        killed = float(problem.site.traffic_consequences(layout, outcome).fatalities)
     return Release(bill.harm + bill.repair, outcome.road_volume, outcome.reached, failed, killed)
 
 

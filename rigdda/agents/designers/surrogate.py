@@ -20,10 +20,10 @@ from rigdda.envs import DesignProblem
 
 Floats = NDArray[np.float64]
 
-NEAR, SHARE = 2.0, 0.08
+STATION_LENGTH, STATION_LENGTH_SHARE = 2.0, 0.08
 """Correlation length over stations [m], and the same as a share of the zone [-]. The greater of the
 two is used. Benches are a few metres long."""
-HEIGHT, LENGTH, CLASS = 0.35, 0.5, 0.7
+HEIGHT, SIZE_LENGTHS, CLASS = 0.35, 0.5, 0.7
 """Correlation length over the logarithm of heights, of other lengths and of energy classes [-]."""
 SPREAD, MORE = 0.03, 0.25
 """Prior standard deviation of the remaining share m of the risk is SPREAD + MORE m (1 - m) [-].
@@ -35,14 +35,14 @@ OF_SITE, OF_KIND = 0.2, 0.25
 on the same sites."""
 COMMON = 0.5
 """Correlation of the errors of layouts that were simulated on the same releases [-]."""
-MISSED = 1e4
+EXCESS_PENALTY = 1e4
 """Penalty on the excess over a target, which ranks layouts that miss it behind all others, in units
 of the risk without barriers [-]."""
-NOISE = 0.01
+FIRST_VARIANCE = 0.01
 """Variance of the estimate of a candidate before any is known, over the squared risk [-]."""
-DRAWS = 1000
+GAIN_DRAWS = 1000
 """Number of draws, each with its opposite, from which an expected gain is computed."""
-FAR = 4.0
+HOPELESS_DEVIATIONS = 4.0
 """Number of standard deviations by which a layout must be behind to be left out of a gain [-]."""
 
 
@@ -62,7 +62,7 @@ def expected_gain(value: Floats, change: Floats, floor: Floats) -> float:
     floor : (M,) array
         Least possible values.
     """
-    half = np.random.default_rng(0).standard_normal((DRAWS, len(change)))
+    half = np.random.default_rng(0).standard_normal((GAIN_DRAWS, len(change)))
     after = value + np.concatenate([half, -half]) @ change
     least = np.maximum(after, floor).min(axis=1)
     return max(float(value.min() - least.mean()), 0.0)
@@ -100,7 +100,7 @@ class Surrogate:
         bare = [without.by_event[name] for name in names] if self.priced else [1.0] * len(names)
         self._bare = np.array(bare) / max(math.fsum(bare), 1e-300)
         self._shares = np.zeros((0, len(names)))
-        self._scale = max(NEAR, SHARE * (zone.end - zone.start))
+        self._scale = max(STATION_LENGTH, STATION_LENGTH_SHARE * (zone.end - zone.start))
         self.layouts: list[Layout] = []
         self.place: dict[Layout, int] = {}
         self._barriers: dict[Barrier, int] = {}
@@ -195,7 +195,7 @@ class Surrogate:
         """Return Z of every layout at `hope` standard deviations below the mean, (M,) [-]."""
         costs = (self.annual + price * self.capital) / self.worth
         left = np.maximum(self.mean - hope * deviation, 0.0)
-        return costs + left + MISSED * np.maximum(self.excess - hope * deviation, 0.0)
+        return costs + left + EXCESS_PENALTY * np.maximum(self.excess - hope * deviation, 0.0)
 
     def joint(self, arm: Arm, nothing: Arm) -> tuple[float, float]:
         """Return Z of an arm over the risk without barriers and the variance of this estimate [-].
@@ -226,7 +226,7 @@ class Surrogate:
             return 0.0
         columns = self._columns([self.place[layout] for layout in layouts])
         least = min(float(value.min()), bare)
-        near = value - FAR * self.deviation <= least
+        near = value - HOPELESS_DEVIATIONS * self.deviation <= least
         values = np.append(value[near], bare)
         change = np.concatenate([columns[:, near], np.zeros((len(columns), 1))], axis=1)
         floor = np.append(self.annual[near] / self.worth, bare)
@@ -263,7 +263,7 @@ class Surrogate:
 
         The result deviates from the mean by one standard deviation of its forecast and noise.
         """
-        noise = float(np.median([seen[2] for seen in self._seen])) if self._seen else NOISE
+        noise = float(np.median([seen[2] for seen in self._seen])) if self._seen else FIRST_VARIANCE
         column = self._posterior_column(i)
         for other in earlier:
             column = column - other * other[i]
@@ -340,6 +340,6 @@ def _coordinates(barrier: Barrier, near: float) -> tuple[float, ...]:
         kind,
         barrier.x / near,
         np.log(max(tall, 0.1)) / HEIGHT,
-        np.log(max(size, 0.1)) / LENGTH,
+        np.log(max(size, 0.1)) / SIZE_LENGTHS,
         np.log(named or 1.0) / CLASS,
     )

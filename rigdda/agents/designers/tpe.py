@@ -25,7 +25,7 @@ from rigdda.agents.designers.protocol import (
 )
 from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem
-from rigdda.envs.encoding import NUMBERS, slot_size
+from rigdda.envs.encoding import SLOT_NUMBERS, slot_size
 
 if TYPE_CHECKING:
     from optuna.distributions import BaseDistribution
@@ -50,9 +50,9 @@ def vector(problem: DesignProblem, parameters: Mapping[str, Any]) -> NDArray[np.
     """Return the decision vector (size,) for the given parameters."""
     slots = np.full((problem.max_barriers, slot_size(problem.kinds)), -1.0)
     for i, slot in enumerate(slots):
-        slot[:NUMBERS] = [parameters[f"{name} {i}"] for name in NAMES]
+        slot[:SLOT_NUMBERS] = [parameters[f"{name} {i}"] for name in NAMES]
         if len(problem.kinds) > 1:
-            slot[NUMBERS + problem.kinds.index(parameters[f"kind {i}"])] = 1.0
+            slot[SLOT_NUMBERS + problem.kinds.index(parameters[f"kind {i}"])] = 1.0
     return slots.ravel()
 
 
@@ -63,7 +63,7 @@ def parameters(problem: DesignProblem, layout: Layout) -> dict[str, Any]:
     for i, slot in enumerate(slots):
         out |= {f"{name} {i}": float(slot[j]) for j, name in enumerate(NAMES)}
         if len(problem.kinds) > 1:
-            out[f"kind {i}"] = problem.kinds[int(np.argmax(slot[NUMBERS:]))]
+            out[f"kind {i}"] = problem.kinds[int(np.argmax(slot[SLOT_NUMBERS:]))]
     return out
 
 

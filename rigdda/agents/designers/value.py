@@ -12,7 +12,7 @@ from rigdda.agents.designers.race import forecast_pool
 from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem
 
-REPORT = 64
+REPORT_RELEASES = 64
 """Largest number of releases on which the layout is evaluated."""
 
 
@@ -38,4 +38,4 @@ def design(
     best = surrogate.best(1)
     forecast = surrogate.value()[surrogate.place[best[0]]] if best else 1.0
     layout = best[0] if forecast < 1.0 or surrogate.has_targets else ()
-    return ledger.result(ledger.evaluate(layout, "report", min(REPORT, ledger.left)))
+    return ledger.result(ledger.evaluate(layout, "report", min(REPORT_RELEASES, ledger.left)))

@@ -72,7 +72,7 @@ def corridor(
     if budgets:
         where = replace(where, budgets=budgets)
     problem = CorridorProblem(where, checks=checks)
-    folder = folder_for(out, f"corridor-{where.name}", *report.FILES)
+    folder = folder_for(out, f"corridor-{where.name}", *report.CORRIDOR_FILES)
     stored = folder / "evaluations"
     stored.mkdir(exist_ok=True)
     with recorded_run(folder), progress(releases * len(where.sections)) as tick:
@@ -99,5 +99,5 @@ def corridor(
             )
     click.echo(
         f"{len(where.sections)} sections, {where.length:,.0f} m, {plan.releases:,} releases; "
-        f"{', '.join(report.FILES)} and layouts are in {folder}"
+        f"{', '.join(report.CORRIDOR_FILES)} and layouts are in {folder}"
     )

@@ -138,7 +138,7 @@ def design(
     An interrupted run continues from evaluations.jsonl. A folder that contains the design of
     another problem (problem.json) is refused.
     """
-    from rigdda.agents.designers.store import FILE, record_problem
+    from rigdda.agents.designers.store import PROBLEM_FILE, record_problem
     from rigdda.app import design as job
     from rigdda.app.reports import design_report as report
     from rigdda.app.uncertainty import ground_band
@@ -147,7 +147,7 @@ def design(
     problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone, checks)
     fitted = None if posterior is None else read_posterior(posterior, problem.site)
     folder = folder_for(
-        out, f"design-{problem.site.name}", *report.DESIGN_FILES, *report.BAND_FILES, FILE
+        out, f"design-{problem.site.name}", *report.DESIGN_FILES, *report.BAND_FILES, PROBLEM_FILE
     )
     record_problem(folder, problem, *report.DESIGN_FILES)
     band = None

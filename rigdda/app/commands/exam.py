@@ -42,10 +42,10 @@ if TYPE_CHECKING:
               "given.")  # fmt: skip
 @click.option("--corridors", type=WholeNumber(0), metavar="N",
               help="Play only the first N corridors.")  # fmt: skip
-@click.option("--budget", "budgets", type=WholeNumber(0, limits.RELEASES), multiple=True,
+@click.option("--budget", "budgets", type=WholeNumber(0, limits.JOB_RELEASES), multiple=True,
               metavar="N", help="Releases per section. May be repeated.  [default: those of the "
               "specification]")  # fmt: skip
-@click.option("--verify", type=WholeNumber(10, limits.RELEASES), metavar="N",
+@click.option("--verify", type=WholeNumber(10, limits.JOB_RELEASES), metavar="N",
               help="Releases for the verification of each layout.  [default: that of the "
               "specification]")  # fmt: skip
 @seed_option("Seed of the tasks and of their releases.", SEED)

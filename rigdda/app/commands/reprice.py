@@ -63,7 +63,7 @@ def reprice(
 
     asked = job.other_targets(target, failure, target_risk)
     done = job.reprice(results, job.parse_all(settings), asked, max_cost)
-    files = (*reprice_report.FILES, *design_report.FRONTIER_FILES)
+    files = (*reprice_report.REPRICE_FILES, *design_report.FRONTIER_FILES)
     folder = folder_for(out, f"reprice-{results.resolve().name}", *files)
     if folder.resolve() == results.resolve():
         raise click.UsageError("--out is the folder of the design: name another folder")

@@ -75,7 +75,7 @@ def sensitivity(
     where.realise(barriers)
     inputs = parameters.inputs(names, where, barriers, posterior)
     asked = job.plan(where, barriers, inputs, method, samples, releases, seed)
-    folder = folder_for(out, f"sensitivity-{where.name}", *sensitivity_report.FILES)
+    folder = folder_for(out, f"sensitivity-{where.name}", *sensitivity_report.SENSITIVITY_FILES)
     with recorded_run(folder, where), progress(asked.size) as tick:
         found = job.run(asked, folder, tick)
         tick(asked.size, "tables and picture")
@@ -88,5 +88,5 @@ def sensitivity(
     resumed = f", {found.resumed:,} from an interrupted run" if found.resumed else ""
     click.echo(
         f"{len(asked.sites):,} points with {len(asked.groups):,} simulated sites, {asked.size:,} "
-        f"releases{resumed}; {', '.join(sensitivity_report.FILES)} are in {folder}"
+        f"releases{resumed}; {', '.join(sensitivity_report.SENSITIVITY_FILES)} are in {folder}"
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from rigdda.app.terminal import (
-    TRAFFIC,
+    TRAFFIC_HEADING,
     executor_option,
     finding,
     folder_for,
@@ -48,7 +48,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
     asked = studies.load(file)
     asked = replace(asked, site=released(asked.site))
-    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.FILES)
+    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.STUDY_FILES)
     with recorded_run(folder, asked.site), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
         tick(asked.size, "tables and pictures")
@@ -63,7 +63,7 @@ def study(file: str, seed: int, out: Path | None) -> None:
     show(study_report.events(found))
     risks = study_report.risks(found)
     if risks is not None:
-        click.echo(TRAFFIC.format(asked.site.traffic))
+        click.echo(TRAFFIC_HEADING.format(asked.site.traffic))
         show(risks)
     for line in study_report.sentences(found):
         finding(line)

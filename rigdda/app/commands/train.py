@@ -38,7 +38,7 @@ EPISODES = 49_152
 @click.option("--sites", type=WholeNumber(2), metavar="N",
               help="Number of random sites to train on.  [default: 512 for a policy, 96 for the "
               "value network, 12 for corridors]")  # fmt: skip
-@click.option("--episodes", type=WholeNumber(0, limits.RELEASES), metavar="N",
+@click.option("--episodes", type=WholeNumber(0, limits.JOB_RELEASES), metavar="N",
               help="Number of episodes, for a policy.  [default: 49152]")  # fmt: skip
 @seed_option("Seed of all random numbers.", SEED)
 @out_option("train")
@@ -67,24 +67,24 @@ def train(model: str, sites: int | None, episodes: int | None, seed: int, out: P
     if model != "policy" and episodes is not None:
         raise click.UsageError("--episodes is for --model policy: leave it out")
     if model == "corridor":
-        folder = folder_for(out, "train", agent.FILE.name)
+        folder = folder_for(out, "train", agent.PROSPECT_FILE.name)
         with recorded_run(folder), progress(sites) as tick:
             found = agent.train(sites, seed, folder, tick)
         most = 100.0 * found.gain[-1]
         click.echo(
             f"forecasts on {sites} sites: unlimited money gains {most:.0f} % of the annual cost; "
-            f"{agent.FILE.name} is in {folder}"
+            f"{agent.PROSPECT_FILE.name} is in {folder}"
         )
         return
     if model == "value":
         asked = value_training.ValueTerms(sites, seed)
-        folder = folder_for(out, "train", *value_training.FILES)
+        folder = folder_for(out, "train", *value_training.VALUE_FILES)
         with recorded_run(folder), progress(asked.sites) as tick:
             value_training.train(asked, folder, tick)
         click.echo(f"value network of {asked.sites} sites; value.safetensors is in {folder}")
         return
     terms = training.Terms(sites, EPISODES if episodes is None else episodes, seed)
-    folder = folder_for(out, "train", *training.FILES)
+    folder = folder_for(out, "train", *training.TRAINING_FILES)
     with recorded_run(folder), progress(terms.episodes) as tick:
         trained = training.train(terms, folder, lambda done: tick(done, "PPO"))
     click.echo(

@@ -73,7 +73,7 @@ class ReleaseCounter:
         try:
             return self._answer(request)
         except BadInput as bad:
-            return RefusedReply(bad.field, str(bad.value), bad.mend)
+            return RefusedReply(bad.field, str(bad.value), bad.hint)
         except (Error, msgspec.MsgspecError) as error:
             return RefusedReply("request", type(error).__name__, str(error))
 

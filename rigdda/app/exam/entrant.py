@@ -103,7 +103,7 @@ def run(pipe: Connection, entry: str, corridor_entry: str, secrets: tuple[str, .
             at = f"on {order.name}: "
             line.tell(_submission(order, line, function, other))
     except BadInput as bad:
-        line.tell(FailRequest(at + (bad.mend if bad.field == "--entry" else str(bad))))
+        line.tell(FailRequest(at + (bad.hint if bad.field == "--entry" else str(bad))))
     except BaseException as error:
         print_own_frames(error)
         line.tell(FailRequest(f"{at}{type(error).__name__}: {error}"))

@@ -15,7 +15,7 @@ from rigdda.agents.designers.constant import constant as best_constant
 from rigdda.agents.designers.menu import Menu
 from rigdda.app.exam.task import Task
 
-LEAST = 60
+LEAST_RELEASES = 60
 """Least number of releases of a search."""
 
 
@@ -42,7 +42,7 @@ def random_layout(task: Task) -> Layout:
 
 def random_search(task: Task) -> Layout:
     """Build the best of random layouts."""
-    return _search(task, "random") if task.left >= LEAST else random_layout(task)
+    return _search(task, "random") if task.left >= LEAST_RELEASES else random_layout(task)
 
 
 def race(task: Task) -> Layout:
@@ -72,7 +72,7 @@ def value(task: Task) -> Layout:
 
 def _search(task: Task, name: str) -> Layout:
     """Return the layout of a designer."""
-    if task.left < LEAST:
+    if task.left < LEAST_RELEASES:
         return constant(task)
     designer: ModuleType = designers.module(name)
     result = designer.design(task.problem, task.left, task.seed, None, task.store())

@@ -22,7 +22,14 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-FILES = ("budgets.csv", "sections.csv", "fronts.csv", "priorities.csv", "gain.png", "strip.png")
+CORRIDOR_FILES = (
+    "budgets.csv",
+    "sections.csv",
+    "fronts.csv",
+    "priorities.csv",
+    "gain.png",
+    "strip.png",
+)
 """Files that `write` writes besides the folder `layouts`."""
 
 PRIORITIES = (
@@ -315,4 +322,4 @@ def _row(
                      align="edge", color=colours[kind], linewidth=0)  # fmt: skip
 
 
-__all__ = ["DPI", "FILES", "table_of_budgets", "table_of_sections", "write"]
+__all__ = ["CORRIDOR_FILES", "DPI", "table_of_budgets", "table_of_sections", "write"]

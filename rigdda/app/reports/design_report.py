@@ -199,7 +199,7 @@ SHEET_COLUMNS = ("layout", "fence", "quantity", "symbol", "value", "unit", "basi
 def sheet_rows(answer: RuleAnswer, checks: LayoutChecks) -> Iterator[dict[str, Any]]:
     """Yield the rows of the design sheets of the rule's fence and of the fences of a layout."""
     own = [] if answer.check is None else [answer.check]
-    name = answer.name if answer.name == rule.NAME else "nearest to the rule"
+    name = answer.name if answer.name == rule.RULE_NAME else "nearest to the rule"
     for layout, found in ((name, own), (FOUND_LAYOUT, checks.fences)):
         for check in found:
             yield from _sheet(layout, check)
@@ -256,7 +256,7 @@ def demand_rows(problem: DesignProblem, envelope: DesignEnvelope) -> Iterator[di
 def rule_words(answer: RuleAnswer) -> str:
     """Return in words what the rule asks for, or what stands in its place and why."""
     caveat = f"; {answer.caveat}" if answer.caveat else ""
-    if answer.name == rule.NAME and answer.check is not None:
+    if answer.name == rule.RULE_NAME and answer.check is not None:
         check = answer.check
         uses = ", ".join(f"{name} {_figure(use)}" for name, use in check.uses.items())
         place = f"{check.fence.label}, at {check.fence.x:.1f} m"
@@ -492,7 +492,7 @@ def draw_band(path: Path, band: Band) -> None:
 
 
 DESIGN_FILES = (
-    "evaluations.csv", "evaluations.jsonl", archive.FILE, "layouts.csv", "chances.csv",
+    "evaluations.csv", "evaluations.jsonl", archive.ARCHIVE_FILE, "layouts.csv", "chances.csv",
     "layout.toml", "section.png", "cost.png", "episode.rrd", *CHECK_FILES,
 )  # fmt: skip
 

@@ -24,10 +24,10 @@ Money = tuple[float, float, float]
 """Z with the ends of its 95 % interval [EUR per metre and year]."""
 
 
-OFTEN = 0.05
+REPORTED_REACH = 0.05
 """Share of the releases of a design event that reach the road from which it is told [-]."""
 
-MANY = 1000.0
+EXCESSIVE_USE = 1000.0
 """Utilisation above which its value says no more; one without any capacity is infinite [-]."""
 
 
@@ -123,7 +123,7 @@ def headline(answer: DesignAnswer) -> str:
 def _left(answer: DesignAnswer) -> str:
     """Return a sentence on how often rock still reaches the road; empty if it hardly does."""
     event, share = answer.reaching
-    if share < OFTEN:
+    if share < REPORTED_REACH:
         return ""
     return f" Rock of {event!r} still reaches the road in {percent(share)} of the releases."
 
@@ -144,8 +144,8 @@ def is_existing(failed: FailedCheck) -> bool:
 
 def _times(use: float) -> str:
     """Return a utilisation with two decimals below 10, and in whole above."""
-    if use > MANY:
-        return f"more than {MANY:,.0f}"
+    if use > EXCESSIVE_USE:
+        return f"more than {EXCESSIVE_USE:,.0f}"
     return f"{use:.2f}" if use < 9.995 else f"{use:,.0f}"
 
 
@@ -197,10 +197,10 @@ def unfitted(site: Site) -> str:
     )
 
 
-SURE = 0.05
+REPORTED_FAILURE = 0.05
 """Upper bound of the probability of failure in a design event above which it is reported [-]."""
 
-PART = 1 / 3
+CAUSE_SHARE = 1 / 3
 """Least share of the remaining risk for which an event is named as its cause [-]."""
 
 
@@ -231,7 +231,7 @@ def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: 
     return "; ".join(filter(None, [*parts, left]))
 
 
-RANK = {None: 0, MET: 0, UNDECIDED: 1, MISSED: 2}
+TARGET_RANK = {None: 0, MET: 0, UNDECIDED: 1, MISSED: 2}
 """Ranks of the states of targets, the best first."""
 
 
@@ -241,11 +241,11 @@ def _costs_less(name: str, other: Evaluation, best: tuple[str, Evaluation]) -> s
     if not other.ci[1] < chosen.ci[0]:
         return ""
     line = f"the layout {name!r} costs less per year than {words!r}"
-    if RANK[other.targets] > RANK[chosen.targets]:
+    if TARGET_RANK[other.targets] > TARGET_RANK[chosen.targets]:
         return (
             f"{line}, but its targets are {other.targets}, and those of the latter {chosen.targets}"
         )
-    if RANK[other.targets] == RANK[MISSED]:
+    if TARGET_RANK[other.targets] == TARGET_RANK[MISSED]:
         return f"{line}, and misses the targets, too"
     return f"{line}: use a larger --budget"
 
@@ -361,7 +361,7 @@ def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
         for name, other in cases[1:-1]
         if other.ci[0] <= chosen.ci[1] and chosen.ci[0] <= other.ci[1]
         if other.cost < chosen.cost and euros(other.cost) != euros(chosen.cost)
-        if RANK[other.targets] <= RANK[chosen.targets]
+        if TARGET_RANK[other.targets] <= TARGET_RANK[chosen.targets]
     ]
 
 
@@ -390,7 +390,7 @@ def compliance(done: DesignStudy) -> str:
     free = other.evaluation
     failed = failed_checks(done.other_checks[other.name])
     faults = [f"fails its checks ({failed_words(failed)})"] if failed else []
-    if RANK[free.targets] > RANK[chosen.targets]:
+    if TARGET_RANK[free.targets] > TARGET_RANK[chosen.targets]:
         faults.append(f"has targets that are {free.targets}")
     built = " and ".join(f"{b.label} at x = {b.x:.1f} m" for b in free.layout) or "no barrier"
     but = f", which {' and '.join(faults)}" if faults else ""
@@ -477,7 +477,7 @@ def left_over(evaluation: Evaluation) -> str:
     words = f"the remaining harm and repair are {euros(total)} EUR per metre and year"
     if len(left) == 1:
         return words
-    if left[most] < PART * total:
+    if left[most] < CAUSE_SHARE * total:
         return f"{words}; no event contributes more than {at_most(left[most] / total)}"
     return f"{words}; {euros(left[most])} of this is from the event {most!r}"
 
@@ -487,7 +487,7 @@ def failing(site: Site, evaluation: Evaluation) -> list[str]:
     lines = []
     for event in design_events(site) if site.standing(evaluation.layout) else ():
         chance = evaluation.failure[event]
-        if chance.releases and chance.bound > SURE:
+        if chance.releases and chance.bound > REPORTED_FAILURE:
             lines.append(
                 f"a barrier fails in {percent(chance.probability)} of the releases of the design "
                 f"event {event!r} (95 % upper bound {at_most(chance.bound)})"

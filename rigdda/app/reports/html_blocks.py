@@ -61,7 +61,7 @@ class ResultsFolder:
             return None
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DoubtfulInput)  # the command itself has told it
-            return Site.parse(text, str(self.path / run_record.FILE))
+            return Site.parse(text, str(self.path / run_record.RECORD_FILE))
 
     def files(self, pattern: str, command: str = "") -> list[str]:
         """Return the names of the files that match a pattern, in order.
@@ -92,12 +92,12 @@ class ResultsFolder:
         file = self.path / name
         head, *rows = [*csv.reader(io.StringIO(read(FIELD, file), newline=""))] or [[]]
         if lacking := [column for column in needed if column not in head]:
-            mend = f"it lacks the column {lacking[0]!r}: run the command that made it again"
-            raise BadInput(FIELD, str(file), mend)
+            hint = f"it lacks the column {lacking[0]!r}: run the command that made it again"
+            raise BadInput(FIELD, str(file), hint)
         for number, row in enumerate(rows, 2):
             if len(row) != len(head):
-                mend = f"repair line {number}, which has {len(row)} cells, not {len(head)}"
-                raise BadInput(FIELD, str(file), f"{mend}, or run the command again")
+                hint = f"repair line {number}, which has {len(row)} cells, not {len(head)}"
+                raise BadInput(FIELD, str(file), f"{hint}, or run the command again")
         return head, [dict(zip(head, row, strict=True)) for row in rows]
 
     def picture(self, name: str) -> Path:
@@ -134,24 +134,24 @@ def open_all(paths: Sequence[Path]) -> list[ResultsFolder]:
 def _records(path: Path) -> dict[str, RunRecord]:
     """Return the records of a results folder after checking that it is complete."""
     if not path.is_dir():
-        mend = "name an existing folder that rigdda design, simulate or study wrote"
-        raise BadInput(FIELD, str(path), mend)
+        hint = "name an existing folder that rigdda design, simulate or study wrote"
+        raise BadInput(FIELD, str(path), hint)
     records = run_record.read(path)
     if not records:
-        mend = (
-            f"it has no {run_record.FILE}: name a folder that rigdda design, simulate or study "
-            "wrote, or run the command that made it again"
+        hint = (
+            f"it has no {run_record.RECORD_FILE}: name a folder that rigdda design, simulate or "
+            "study wrote, or run the command that made it again"
         )
-        raise BadInput(FIELD, str(path), mend)
+        raise BadInput(FIELD, str(path), hint)
     for record in records.values():
         again = shlex.join(["rigdda", *record.arguments])
         if not record.ended:
-            mend = f"its run was interrupted or has not ended: run it again to go on: {again}"
-            raise BadInput(FIELD, str(path), mend)
+            hint = f"its run was interrupted or has not ended: run it again to go on: {again}"
+            raise BadInput(FIELD, str(path), hint)
         for name in record.files:
             if name.endswith(NEEDED) and not (path / name).is_file():
-                mend = f"this file is missing: put it back or run the command again: {again}"
-                raise BadInput(FIELD, str(path / name), mend)
+                hint = f"this file is missing: put it back or run the command again: {again}"
+                raise BadInput(FIELD, str(path / name), hint)
     return records
 
 
@@ -168,8 +168,8 @@ def replay_of(folders: Sequence[ResultsFolder]) -> Path:
             if (folder.path / name).is_file():
                 return folder.path / name
     named = ", ".join(str(folder.path) for folder in folders)
-    mend = "none has a replay (episode.rrd), which --serve shows: add a folder of rigdda design"
-    raise BadInput(FIELD, named, mend)
+    hint = "none has a replay (episode.rrd), which --serve shows: add a folder of rigdda design"
+    raise BadInput(FIELD, named, hint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,8 +305,8 @@ def _float(text: str, name: str, where: str) -> float:
     try:
         return float(text)
     except ValueError:
-        mend = f"{text!r} in the column {name!r} is not a number: run the command again"
-        raise BadInput(FIELD, where, mend) from None
+        hint = f"{text!r} in the column {name!r} is not a number: run the command again"
+        raise BadInput(FIELD, where, hint) from None
 
 
 def words(head: str, name: str) -> Column:
@@ -475,8 +475,8 @@ def inline(text: str, name: str, mark: str, where: str) -> str:
     found = re.search(r"<svg\b([^>]*)>(.*)</svg>", text, re.DOTALL)
     box = re.search(r'viewBox="([^"]*)"', found[1]) if found else None
     if found is None or box is None:
-        mend = "this is not a picture: run the command that made it again"
-        raise BadInput(FIELD, where, mend)
+        hint = "this is not a picture: run the command that made it again"
+        raise BadInput(FIELD, where, hint)
     body = re.sub(r"<metadata>.*?</metadata>", "", found[2], flags=re.DOTALL)
     body = re.sub(r'\bid="', f'id="{mark}-', body)
     body = re.sub(r"url\(#", f"url(#{mark}-", body)

@@ -49,8 +49,8 @@ from rigdda.app.reports.html_blocks import (
     value,
     words,
 )
-from rigdda.app.reports.stations import ALL, QUANTITIES, RATE
-from rigdda.app.reports.stations import SHOWN as MAIN
+from rigdda.app.reports.stations import ALL_EVENTS, PASSING_RATE, QUANTITIES
+from rigdda.app.reports.stations import PRINTED as MAIN
 from rigdda.app.reports.tables import RISKS
 from rigdda.app.reports.wording import (
     at_most,
@@ -106,7 +106,7 @@ class Exhibit:
 
 def _main(row: Row) -> bool:
     """Return whether a row of the table of stations is shown: of single events only the main."""
-    return row["event"] == ALL or row["quantity"] in (*MAIN, RATE)
+    return row["event"] == ALL_EVENTS or row["quantity"] in (*MAIN, PASSING_RATE)
 
 
 def _called(name: str, barriers: str) -> str:
@@ -417,7 +417,7 @@ EXHIBITS = (
 """What is shown of each results folder, in the order of the report. A new table or picture needs
 one entry here; tables without an entry are listed in the appendix."""
 
-RAW = {
+LONG_TABLES = {
     "evaluations.csv": "layouts that the search evaluated",
     "outcomes.csv": "one row for each release: what reached the road and each barrier",
     "passages.csv": "one row for each passage of a block at a station",
@@ -639,7 +639,7 @@ class ReportSection:
     opening: Callable[[Folders], Iterable[Block]] = lambda folders: ()
 
 
-LIMITS = (
+METHOD_LIMITS = (
     "The section is two-dimensional. Blocks do not leave its plane, and channels or ridges that "
     "gather or spread rock along the road are not seen.",
     "A block is as long along the road as the root of its cross-section. Volumes, masses and "
@@ -717,8 +717,8 @@ def _design_blocks(folder: ResultsFolder) -> Iterator[Block]:
     _, rows = folder.table("layouts.csv", ("chosen", "objective_low", "objective_high"))
     chosen = next((row for row in rows if row["chosen"] == "True"), None)
     if chosen is None:
-        mend = "no row is the chosen one: run the command that made it again"
-        raise BadInput(FIELD, str(folder.path / "layouts.csv"), mend)
+        hint = "no row is the chosen one: run the command that made it again"
+        raise BadInput(FIELD, str(folder.path / "layouts.csv"), hint)
     site, targets = folder.site, chosen["targets"]
     layout = rigdda.load_layout(folder.path / "layout.toml")
     line = headline(_answer(folder, chosen, rows[0]))
@@ -836,7 +836,7 @@ def _passing(folder: ResultsFolder) -> Iterator[Block]:
     what = f"with the layout of {layout}" if layout else bare
     lines = []
     for row in rows:
-        if row["event"] == last and row["quantity"] == RATE:
+        if row["event"] == last and row["quantity"] == PASSING_RATE:
             own = {r["quantity"]: r for r in rows if r["x_m"] == row["x_m"] and r["event"] == last}
             lines.append(_station(row, own, what))
     if lines:
@@ -883,7 +883,7 @@ def assumed_section(folders: Folders) -> Iterator[Block]:
 
 def limits_section(_: Folders) -> Iterator[Block]:
     """Yield the limits of the method."""
-    yield Items(LIMITS)
+    yield Items(METHOD_LIMITS)
 
 
 def repeat_section(folders: Folders) -> Iterator[Block]:
@@ -933,10 +933,10 @@ def appendix_section(folders: Folders) -> Iterator[Block]:
         shown = {name for e in EXHIBITS for name in folder.files(e.files, e.command)}
         for name in (name for name in folder.others() if name not in shown):
             head, found = folder.table(name)
-            if name not in RAW and len(found) <= WHOLE_ROWS and len(head) <= WHOLE_COLUMNS:
+            if name not in LONG_TABLES and len(found) <= WHOLE_ROWS and len(head) <= WHOLE_COLUMNS:
                 yield table(folder, name, f"{folder.label}/{name}", "All rows of the file.")
             else:
-                what = RAW.get(name, f"columns: {', '.join(head)}")
+                what = LONG_TABLES.get(name, f"columns: {', '.join(head)}")
                 rows.append((f"{folder.label}/{name}", what, f"{len(found):,}"))
     if rows:
         names = ("file", "what it holds", "rows")

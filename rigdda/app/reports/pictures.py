@@ -25,10 +25,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda import Barrier, Fence, Layout, Mesh, Run, Simulation, Site
 from rigdda.app.reports.stations import (
-    ALL,
+    ALL_EVENTS,
+    PASSING_RATE,
     PER,
     QUANTITIES,
-    RATE,
     Passing,
     Rows,
     summary,
@@ -674,7 +674,7 @@ HISTOGRAM_RATIO = 1e4
 WHOLE, NORMAL = "#222222", "#b5651d"
 """Colours of all events together, and of heights normal to the slope."""
 
-ALONG_SLOPE = ("energy", "velocity", "height", RATE)
+ALONG_SLOPE = ("energy", "velocity", "height", PASSING_RATE)
 """Quantities of the picture along the slope."""
 
 AT_STATION = ("energy", "velocity", "height")
@@ -702,7 +702,7 @@ def along_slope(path: str | os.PathLike[str], passing: Passing, rows: Rows) -> N
             figure.subplots(2, 2, sharex=True).flat, ALONG_SLOPE, strict=True
         ):
             own = [row for row in rows if row["quantity"] == quantity]
-            if quantity == RATE:
+            if quantity == PASSING_RATE:
                 _rates(axes, passing, own)
             else:
                 other = "height_normal" if quantity == "height" else ""
@@ -755,7 +755,7 @@ def _rates(axes: Axes, passing: Passing, rows: Rows) -> None:
 
 def _colour_of_group(passing: Passing, group: str) -> str:
     """Return the colour of an event, or of all events."""
-    return WHOLE if group == ALL else colour_of(passing.site, group)
+    return WHOLE if group == ALL_EVENTS else colour_of(passing.site, group)
 
 
 def _legend(figure: Figure, passing: Passing) -> None:

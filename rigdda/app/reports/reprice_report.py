@@ -11,10 +11,10 @@ from rigdda.app.design_study import SHED
 from rigdda.app.reports import design_report, findings, pictures
 from rigdda.app.reports.tables import known_risks, write_risks, write_rows
 from rigdda.app.reports.wording import number
-from rigdda.app.reprice import BEST, Change, Repriced
+from rigdda.app.reprice import BEST_OF_SEARCH, Change, Repriced
 from rigdda.envs import Evaluation
 
-FILES = ("costs.csv", "site.toml", "layout.toml", "cost.png")
+REPRICE_FILES = ("costs.csv", "site.toml", "layout.toml", "cost.png")
 
 
 def write(done: Repriced, folder: Path) -> None:
@@ -50,7 +50,7 @@ def _row(done: Repriced, name: str, e: Evaluation) -> dict[str, Any]:
         "debris_share": e.debris_share,
         "targets": e.targets or "",
         "releases": e.releases,
-        "verified": name != BEST or done.verified,
+        "verified": name != BEST_OF_SEARCH or done.verified,
     }
     site = done.problem.site
     if any(event.design for event in site.events):
@@ -78,9 +78,9 @@ def sentences(done: Repriced) -> list[str]:
     if chosen.layout == found.layout:
         line = f"the layout of the design, {done.cases[-2].name!r}, remains {among}"
     elif done.verified:
-        line = f"{BEST!r} is {among}; the design verified it"
+        line = f"{BEST_OF_SEARCH!r} is {among}; the design verified it"
     else:
-        line = f"{BEST!r} is {among}, but was not verified: Z is the mean of the "
+        line = f"{BEST_OF_SEARCH!r} is {among}, but was not verified: Z is the mean of the "
         line += f"{chosen.releases:,} releases of the search by which it was chosen, and probably "
         line += "too low; `rigdda design` with site.toml searches and verifies again"
     lines = [line]

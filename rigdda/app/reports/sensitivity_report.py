@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from rich.table import Table
 
-FILES = ("sensitivity.csv", "samples.csv", "tornado.png")
+SENSITIVITY_FILES = ("sensitivity.csv", "samples.csv", "tornado.png")
 
 INDEX = {"morris": ("mu_star", "mu"), "sobol": ("ST", "S1")}
 """Names of the main index and of the other one in tables."""
@@ -83,7 +83,7 @@ def samples(found: Sensitivity) -> list[dict[str, Any]]:
 
 
 def write(folder: Path, found: Sensitivity) -> None:
-    """Write `FILES` into a folder."""
+    """Write `SENSITIVITY_FILES` into a folder."""
     write_rows(folder / "sensitivity.csv", rows(found))
     write_rows(folder / "samples.csv", samples(found))
     draw(folder / "tornado.png", found)
@@ -125,7 +125,7 @@ def _ends(low: float, high: float) -> str:
     return f"{_number(low, 'down')} to {_number(high, 'up')}"
 
 
-LONGEST = 24
+LONGEST_INPUT = 24
 """Largest number of letters of an input in a printed table."""
 
 
@@ -134,7 +134,7 @@ def _short(one: Input) -> str:
     name = one.path
     for top in ("surfaces.", "events.", "sources.", "consequences."):
         name = name.removeprefix(top)
-    return name if len(name) <= LONGEST else name[: LONGEST - 3] + "..."
+    return name if len(name) <= LONGEST_INPUT else name[: LONGEST_INPUT - 3] + "..."
 
 
 def explain(found: Sensitivity) -> str:

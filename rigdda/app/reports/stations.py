@@ -20,7 +20,7 @@ from rigdda.app.reports.wording import figure, percent, survey_place
 from rigdda.envs.intervals import Estimate, Mean, estimate, total
 from rigdda.envs.quantiles import BlockSample, Quantile, mean, quantiles
 from rigdda.files import atomic
-from rigdda.passages import AT_END, LEFT, MOVING, STATES, Passages, ends
+from rigdda.passages import AT_END, HAS_LEFT, IN_MOTION, STATES, Passages, ends
 from rigdda.rounding import rounded
 
 if TYPE_CHECKING:
@@ -29,16 +29,16 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Rows = list[dict[str, Any]]
 
-LEVELS = (0.5, 0.9, 0.95, 0.99)
+QUANTILE_LEVELS = (0.5, 0.9, 0.95, 0.99)
 """Shares of passing blocks below the quantiles of the tables."""
 
-ALL = "all events"
+ALL_EVENTS = "all events"
 """Name of the rows over all events, weighted by rate."""
 
 PER = "1/year per 100 m"
 """Unit of rates."""
 
-RATE = "passing_rate"
+PASSING_RATE = "passing_rate"
 """Name of the rows of the passing rate."""
 
 
@@ -95,12 +95,12 @@ class Passing(NamedTuple):
 
     @property
     def groups(self) -> list[str]:
-        """Names of the events, and `ALL` if there are several."""
-        return [*self.events, ALL] if len(self.events) > 1 else self.events
+        """Names of the events, and `ALL_EVENTS` if there are several."""
+        return [*self.events, ALL_EVENTS] if len(self.events) > 1 else self.events
 
     def releases(self, group: str) -> NDArray[np.int64]:
         """Return the indices of the releases of an event or of all events."""
-        if group == ALL:
+        if group == ALL_EVENTS:
             return np.arange(len(self.found.event))
         return np.flatnonzero(self.found.event == self.site.event_names.index(group))
 
@@ -110,13 +110,13 @@ class Passing(NamedTuple):
 
     def own(self, group: str, rows: NDArray[np.void]) -> NDArray[np.void]:
         """Return the rows of an event, or of all events that happen at all."""
-        if group == ALL:
+        if group == ALL_EVENTS:
             return rows[self.rate[rows["event"]] > 0.0]
         return rows[rows["event"] == self.site.event_names.index(group)]
 
     def sample(self, group: str, rows: NDArray[np.void], values: Floats) -> BlockSample:
         """Return values of some rows of an event, or of all events, as a sample of the releases."""
-        rate = self.rate if group == ALL else np.ones(len(self.rate))
+        rate = self.rate if group == ALL_EVENTS else np.ones(len(self.rate))
         return BlockSample(values, rows["release"], self.found.event, rate)
 
     def frequency(self, group: str, rows: NDArray[np.void]) -> Mean:
@@ -125,7 +125,7 @@ class Passing(NamedTuple):
 
     def _drawn(self, group: str) -> list[str]:
         """Return the events of a group that were simulated."""
-        names = self.events if group == ALL else [group]
+        names = self.events if group == ALL_EVENTS else [group]
         return [name for name in names if len(self.releases(name))]
 
     def _frequency(self, event: str, rows: NDArray[np.void]) -> Mean:
@@ -159,7 +159,7 @@ def summary(
     places : sequence of int
         Indices of the stations.
     groups : sequence of str, optional
-        Events, and `ALL` for all together; by default all of `passing.groups`.
+        Events, and `ALL_EVENTS` for all together; by default all of `passing.groups`.
     names : sequence of str
         Names of the quantities; by default all of `QUANTITIES` and the passing rate.
     """
@@ -168,7 +168,7 @@ def summary(
         row
         for k in places
         for group in wanted
-        for row in _station(passing, k, group, names or (*QUANTITIES, RATE))
+        for row in _station(passing, k, group, names or (*QUANTITIES, PASSING_RATE))
     ]
 
 
@@ -180,9 +180,9 @@ def _station(
     x = float(passing.found.stations[station])
     head = {"x_m": x, **survey_place(passing.site, x), "event": group}
     known = {"releases": releases, "n": len(rows)}
-    for name, quantity in ((name, QUANTITIES[name]) for name in names if name != RATE):
+    for name, quantity in ((name, QUANTITIES[name]) for name in names if name != PASSING_RATE):
         sample = passing.sample(group, rows, quantity.of(rows))
-        levels = quantiles(sample, LEVELS)
+        levels = quantiles(sample, QUANTILE_LEVELS)
         yield {
             **head,
             "quantity": name,
@@ -191,16 +191,18 @@ def _station(
             **_ends("mean", mean(sample)),
             **{
                 k: v
-                for q, x in zip(LEVELS, levels, strict=True)
+                for q, x in zip(QUANTILE_LEVELS, levels, strict=True)
                 for k, v in _ends(_q(q), x).items()
             },
             "note": _note(len(rows), levels),
         }
-    if RATE not in names:
+    if PASSING_RATE not in names:
         return
     often = passing.frequency(group, rows) if releases else Mean(*[math.nan] * 3)
-    empty = {k: v for q in LEVELS for k, v in _ends(_q(q), Quantile(*[math.nan] * 3)).items()}
-    yield {**head, "quantity": RATE, "unit": PER, **known, **_ends("mean", often), **empty,
+    empty = {
+        k: v for q in QUANTILE_LEVELS for k, v in _ends(_q(q), Quantile(*[math.nan] * 3)).items()
+    }
+    yield {**head, "quantity": PASSING_RATE, "unit": PER, **known, **_ends("mean", often), **empty,
            "note": "" if releases else "no release of this event"}  # fmt: skip
 
 
@@ -220,7 +222,9 @@ def _note(n: int, levels: Sequence[Quantile]) -> str:
     words = []
     for side in ("low", "high"):
         missing = [
-            _q(q) for q, x in zip(LEVELS, levels, strict=True) if math.isnan(getattr(x, side))
+            _q(q)
+            for q, x in zip(QUANTILE_LEVELS, levels, strict=True)
+            if math.isnan(getattr(x, side))
         ]
         if missing:
             words.append(f"n is too small for the {side} end of {', '.join(missing)}")
@@ -259,10 +263,10 @@ def raw(passing: Passing, places: Sequence[int]) -> Rows:
 def raw_fields(site: Site) -> list[str]:
     """Return the columns of the table of passages of a site."""
     survey = survey_place(site, site.road.start)
-    return [RAW[0], *survey, *RAW[1:]]
+    return [PASSAGE_COLUMNS[0], *survey, *PASSAGE_COLUMNS[1:]]
 
 
-RAW = (
+PASSAGE_COLUMNS = (
     "x_m", "seed", "event", "block", "time_s", "velocity_x_m_s", "velocity_y_m_s",
     "angular_velocity_rad_s", "height_m", "height_normal_m", "height_top_m",
     "energy_translation_kJ", "energy_rotation_kJ", "mass_kg", "width_m",
@@ -288,7 +292,7 @@ def stops(passing: Passing) -> Rows:
     ]
 
 
-POINTS = 120
+RUN_OUT_POINTS = 120
 """Intervals between the chainages of the table of run-out."""
 
 
@@ -302,7 +306,7 @@ def run_out(passing: Passing) -> Rows:
     """
     left, right = ends(passing.site)
     road = passing.site.road
-    grid = np.unique([*np.linspace(left, right, POINTS + 1), road.start, road.end])
+    grid = np.unique([*np.linspace(left, right, RUN_OUT_POINTS + 1), road.start, road.end])
     return [row for group in passing.groups for row in _beyond(passing, group, grid)]
 
 
@@ -314,7 +318,7 @@ def _beyond(passing: Passing, group: str, grid: Floats) -> Iterator[dict[str, An
     weight = passing.sample(group, table, table["x"]).weight
     whole = passing.frequency(group, table).value
     for x in grid.tolist():
-        beyond = (table["x"] > x) | (table["state"] == LEFT)
+        beyond = (table["x"] > x) | (table["state"] == HAS_LEFT)
         often = passing.frequency(group, table[beyond])
         yield {
             "event": group, "x_m": x, **survey_place(passing.site, x),
@@ -325,21 +329,21 @@ def _beyond(passing: Passing, group: str, grid: Floats) -> Iterator[dict[str, An
         }  # fmt: skip
 
 
-ROCK = (0.5, 0.95)
+DEPOSIT_SHARES = (0.5, 0.95)
 """Shares of the rock for which the chainage is told within which it comes to rest."""
 
 
 def stopping(passing: Passing) -> Rows:
     """Return the rows of a table of the chainages within which a share of the rock comes to rest.
 
-    One row for each event, and for all events together, and each share of `ROCK`. Each block counts
-    in proportion to its mass, and each event in proportion to its rate; blocks beyond the road
-    count where they are. `x_m` is the smallest chainage that at least this share of the rock does
-    not pass, with the ends of its 95 % interval. The place where a block stops is not known if it
-    left the profile or still moved at the end of its release. If `x_m` depends on such blocks, it
-    is where they were last, and `bound` is "lower bound"; an end of the interval that depends on
-    them, or for which there are too few releases, is empty. `left` and `moving` are the shares of
-    the rock in such blocks.
+    One row for each event, and for all events together, and each share of `DEPOSIT_SHARES`. Each
+    block counts in proportion to its mass, and each event in proportion to its rate; blocks beyond
+    the road count where they are. `x_m` is the smallest chainage that at least this share of the
+    rock does not pass, with the ends of its 95 % interval. The place where a block stops is not
+    known if it left the profile or still moved at the end of its release. If `x_m` depends on such
+    blocks, it is where they were last, and `bound` is "lower bound"; an end of the interval that
+    depends on them, or for which there are too few releases, is empty. `left` and `moving` are the
+    shares of the rock in such blocks.
     """
     return [row for group in passing.groups for row in _stopping(passing, group)]
 
@@ -353,11 +357,11 @@ def _stopping(passing: Passing, group: str) -> Iterator[dict[str, Any]]:
     weight = sample.weight
     left, moving = (
         float(weight[table["state"] == state].sum() / weight.sum()) if len(table) else math.nan
-        for state in (LEFT, MOVING)
+        for state in (HAS_LEFT, IN_MOTION)
     )
     nowhere = dict.fromkeys(survey_place(passing.site, passing.site.road.start), math.nan)
-    pairs = zip(quantiles(sample, ROCK), quantiles(beyond, ROCK), strict=True)
-    for share, (least, most) in zip(ROCK, pairs, strict=True):
+    pairs = zip(quantiles(sample, DEPOSIT_SHARES), quantiles(beyond, DEPOSIT_SHARES), strict=True)
+    for share, (least, most) in zip(DEPOSIT_SHARES, pairs, strict=True):
         high = most.high if math.isfinite(most.high) else math.nan
         yield {
             "event": group,
@@ -411,9 +415,9 @@ def lower_bound(rows: Rows) -> str:
 def undecided(passing: Passing) -> str:
     """Return in words how many blocks had not stopped at the end, nothing if none."""
     state, words = passing.found.stops["state"], []
-    if left := int((state == LEFT).sum()):
+    if left := int((state == HAS_LEFT).sum()):
         words.append(f"{left:,} left the profile at its end ({ends(passing.site)[1]:g} m)")
-    if moving := int((state == MOVING).sum()):
+    if moving := int((state == IN_MOTION).sum()):
         words.append(f"{moving:,} still moved after {passing.site.motion.duration:g} s")
     if not words:
         return ""
@@ -437,7 +441,7 @@ def _cell(value: Any) -> Any:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
-SHOWN = ("energy", "velocity", "height", "height_normal")
+PRINTED = ("energy", "velocity", "height", "height_normal")
 """Quantities that are printed."""
 
 
@@ -447,10 +451,10 @@ def tables(rows: Rows) -> Iterator[tuple[str, Table]]:
     All events together: quantiles with the ends of their 95 % intervals.
     """
     shown = [row for row in rows if row["event"] == rows[-1]["event"]]
-    for often in (row for row in shown if row["quantity"] == RATE):
+    for often in (row for row in shown if row["quantity"] == PASSING_RATE):
         out = empty_table(("", "median", "95 % (interval)", "99 % (interval)"))
         for row in (row for row in shown if row["x_m"] == often["x_m"]):
-            if row["quantity"] in SHOWN:
+            if row["quantity"] in PRINTED:
                 words = f"{row['quantity'].replace('_', ', ')} [{row['unit']}]"
                 out.add_row(words, *(_words(row, name) for name in ("q50", "q95", "q99")))
         survey = ""

@@ -15,7 +15,7 @@ from rigdda import Layout, Site
 from rigdda.app.reports import pictures
 from rigdda.app.reports.tables import bounded, empty_table, risk_table, write_risks, write_rows
 from rigdda.app.reports.wording import euros, span
-from rigdda.envs.comparison import LEAST, Difference, difference_of_accounts
+from rigdda.envs.comparison import LEAST_PER_EVENT, Difference, difference_of_accounts
 from rigdda.envs.cost import Account, Facts, Risk, Sums, stratified
 from rigdda.envs.intervals import Estimate, estimate
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from rich.table import Table
 
-FILES = ("layouts.csv", "events.csv", "differences.csv", "sections.png", "costs.png")
+STUDY_FILES = ("layouts.csv", "events.csv", "differences.csv", "sections.png", "costs.png")
 """Files besides study.csv."""
 
 QUANTILE = 0.95
@@ -111,7 +111,7 @@ class StudyResults:
     def difference(self, one: StudiedLayout, two: StudiedLayout) -> Difference | None:
         """Return the difference in Z between two layouts; None with too few releases."""
         counts = [int((one.found.event == name).sum()) for name in self.site.event_names]
-        if min(counts) < LEAST:
+        if min(counts) < LEAST_PER_EVENT:
             return None
         layouts, accounts = (one.layout, two.layout), (one.found, two.found)
         return difference_of_accounts(self.site, layouts, accounts, self.facts)
@@ -244,13 +244,13 @@ def write(folder: Path, results: StudyResults, seed: int) -> None:
     Diverged
         If a simulation for the trajectories diverges.
     """
-    write_rows(folder / FILES[0], layout_rows(results))
-    write_rows(folder / FILES[1], event_rows(results))
+    write_rows(folder / STUDY_FILES[0], layout_rows(results))
+    write_rows(folder / STUDY_FILES[1], event_rows(results))
     fields = ("one", "two", "difference", "low", "high", "releases", "differ")
-    write_rows(folder / FILES[2], difference_rows(results), fields)
+    write_rows(folder / STUDY_FILES[2], difference_rows(results), fields)
     write_risks(folder, _known_risks(results))
-    sections(folder / FILES[3], results, seed)
-    bars(folder / FILES[4], results)
+    sections(folder / STUDY_FILES[3], results, seed)
+    bars(folder / STUDY_FILES[4], results)
 
 
 def sections(path: Path, results: StudyResults, seed: int) -> None:

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-OUTCOME = {
+OUTCOME_COLUMNS = {
     "road_volume": ("volume that reaches the road", "m3", 1.0),
     "debris_fraction": ("share of the rock that reaches it", "%", 100.0),
     "debris_on_road": ("debris on the road at the end", "m2", 1.0),
@@ -56,11 +56,11 @@ OUTCOME = {
 }
 """Description, unit and factor for printing of each field of an outcome."""
 
-RUN_OUT = ("run_out_to_road_50", "run_out_to_road_95", "run_out_to_road_100")
+RUN_OUT_COLUMNS = ("run_out_to_road_50", "run_out_to_road_95", "run_out_to_road_100")
 """Columns with the chainages of a release that contain 50, 95 and 100 % of its rock, which are cut
 at the downhill edge of the road [m]; see `rigdda.Outcome.run_out`."""
 
-HIT = {
+BARRIER_COLUMNS = {
     "hits": ("hits", "-", 1.0),
     "max_energy": ("largest energy of a hit", "kJ/m", 1e-3),
     "total_energy": ("energy of all hits", "kJ/m", 1e-3),
@@ -146,10 +146,10 @@ def outcome_row(outcome: Outcome) -> dict[str, Any]:
     """Return an outcome, including that of each barrier, as columns of a CSV file."""
     row: dict[str, Any] = {"event": outcome.event, "width": outcome.width}
     row |= {"released_volume": outcome.released_volume, "reached": outcome.reached}
-    row |= {name: getattr(outcome, name) for name in OUTCOME}
-    row |= zip(RUN_OUT, outcome.run_out, strict=True)
+    row |= {name: getattr(outcome, name) for name in OUTCOME_COLUMNS}
+    row |= zip(RUN_OUT_COLUMNS, outcome.run_out, strict=True)
     for i, barrier in enumerate(outcome.barriers):
-        row |= {f"barrier_{i}_{name}": getattr(barrier, name) for name in HIT}
+        row |= {f"barrier_{i}_{name}": getattr(barrier, name) for name in BARRIER_COLUMNS}
     return row
 
 
@@ -203,7 +203,7 @@ def outcomes(
     ends = 100.0 * chance.low, 100.0 * chance.high
     head = "a block reaches the road [%]"
     table.add_row(head, f"{100.0 * chance.probability:.4g}", _span(ends, ".4g"))
-    for name, (words, unit, factor) in OUTCOME.items():
+    for name, (words, unit, factor) in OUTCOME_COLUMNS.items():
         add(words, unit, factor, [getattr(outcome, name) for outcome in results])
     if run_out is not None:
         table.add_row("run-out of 95 % of the rock [m]", *run_out)
@@ -213,7 +213,7 @@ def outcomes(
         table.add_row(f"{label}, at {barrier.x:.1f} m")
         if words := surveyed(site, barrier.x):
             table.add_row(words.strip())
-        for name, (words, unit, factor) in HIT.items():
+        for name, (words, unit, factor) in BARRIER_COLUMNS.items():
             if isinstance(barrier, Earthwork) and name not in ("overtopped", "caught", *ONLY):
                 continue
             if not isinstance(barrier, ONLY.get(name, object)):
@@ -260,12 +260,12 @@ def empty_table(head: Sequence[str]) -> Table:
 
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for i, name in enumerate(head):
-        left = i == 0 or name in WORDS
+        left = i == 0 or name in TEXT_COLUMNS
         table.add_column(name, justify="left" if left else "right", no_wrap="(95 %)" in name)
     return table
 
 
-WORDS = ("description", "family", "layout", "events (1/year per 100 m)")
+TEXT_COLUMNS = ("description", "family", "layout", "events (1/year per 100 m)")
 """Columns that contain text."""
 
 

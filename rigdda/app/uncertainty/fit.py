@@ -31,7 +31,13 @@ import rigdda
 from rigdda import MECHANICS, BadInput, Site, release_many
 from rigdda.app.reports.stations import QUANTITIES
 from rigdda.app.reports.tables import write_rows
-from rigdda.app.uncertainty.observations import DEPOSIT, LEAST, RUN_OUT, DataSet, DataSets
+from rigdda.app.uncertainty.observations import (
+    DEPOSIT,
+    LEAST_VALUES,
+    OBSERVED_RUN_OUT,
+    DataSet,
+    DataSets,
+)
 from rigdda.app.uncertainty.parameters import Parameter, Posterior, check_once, with_values
 from rigdda.app.uncertainty.score_surface import best_places
 from rigdda.app.uncertainty.varied_sites import PARTS
@@ -56,8 +62,8 @@ def check_parameters(parameters: Sequence[Parameter], model: str) -> None:
     for parameter in parameters:
         if parameter.path.partition(".")[0] not in FITTED_TABLES[model]:
             known = ", ".join(f"{name}.*" for name in FITTED_TABLES[model])
-            mend = f"run-outs of the model {model} do not depend on it: choose from {known}"
-            raise BadInput("--parameters", parameter.path, mend)
+            hint = f"run-outs of the model {model} do not depend on it: choose from {known}"
+            raise BadInput("--parameters", parameter.path, hint)
 
 
 Floats = NDArray[np.float64]
@@ -85,9 +91,9 @@ def computed(site: Site, sets: DataSets, model: Model, seeds: range) -> dict[str
     Diverged
         If a simulation diverges.
     """
-    runs = [one.event for one in sets.values() if one.quantity == RUN_OUT]
+    runs = [one.event for one in sets.values() if one.quantity == OBSERVED_RUN_OUT]
     out = run_outs(site, model, runs, seeds)
-    others = [one for one in sets.values() if one.quantity != RUN_OUT]
+    others = [one for one in sets.values() if one.quantity != OBSERVED_RUN_OUT]
     if not others:
         return out
     if model == "lumped":
@@ -99,7 +105,7 @@ def computed(site: Site, sets: DataSets, model: Model, seeds: range) -> dict[str
     return out | {one.name: _values(site, found, one) for one in others}
 
 
-SPREAD = 400
+DEPOSIT_PIECES = 400
 """Number of equally heavy pieces into which the rock of a computed deposit is divided."""
 
 
@@ -120,7 +126,7 @@ def _values(site: Site, found: Passages, one: DataSet) -> Floats:
     if not len(here):
         return np.array([low - (high - low)])
     share = np.cumsum(here["mass"])
-    place = (np.arange(SPREAD) + 0.5) / SPREAD * share[-1]
+    place = (np.arange(DEPOSIT_PIECES) + 0.5) / DEPOSIT_PIECES * share[-1]
     return np.asarray(here["x"][np.searchsorted(share, place)], dtype=np.float64)
 
 
@@ -154,11 +160,11 @@ def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
     between = float(np.square(each).mean(axis=0).sum())
     per_release = alone / between if between > 0.0 else 0.0
     count = round(per_release * one.releases)
-    if count < LEAST:
-        mend = f"a deposit of {one.releases} of these releases tells as little as {count} blocks: "
-        mend += "give the number of releases that made it in a column releases"
-        raise BadInput(f"observed deposit of {one.event}", count, mend)
-    return min(count, SPREAD)
+    if count < LEAST_VALUES:
+        hint = f"a deposit of {one.releases} of these releases tells as little as {count} blocks: "
+        hint += "give the number of releases that made it in a column releases"
+        raise BadInput(f"observed deposit of {one.event}", count, hint)
+    return min(count, DEPOSIT_PIECES)
 
 
 def observed_values(site: Site, sets: DataSets, seeds: range) -> dict[str, Floats]:
@@ -186,7 +192,7 @@ def units(sets: DataSets) -> dict[str, float]:
         return dict.fromkeys(sets, 1.0)
     found = {}
     for name, one in sets.items():
-        values = one.sample(SPREAD) if one.quantity == DEPOSIT else one.values
+        values = one.sample(DEPOSIT_PIECES) if one.quantity == DEPOSIT else one.values
         spread = float(values.std()) or float(np.abs(values).mean())
         found[name] = spread or 1.0
     return found
@@ -330,7 +336,7 @@ def explore(score: Callable[[Floats], float], dimensions: int, budget: int, seed
 
 Tick = Callable[[int, str], None]
 
-FINALISTS, MORE = 8, 4
+FINALISTS, FINALIST_FACTOR = 8, 4
 """Number of the best candidates that are computed again, and the factor by which their number of
 releases is larger."""
 
@@ -365,7 +371,7 @@ class Fit(NamedTuple):
     @property
     def pooled(self) -> bool:
         """Whether all observations are run-outs, so that they have statistics in common."""
-        return all(one.quantity == RUN_OUT for one in self.sets.values())
+        return all(one.quantity == OBSERVED_RUN_OUT for one in self.sets.values())
 
 
 def fit(
@@ -502,7 +508,7 @@ def search(
         return score
 
     explore(add, len(parameters), budget, seed)
-    fresh = range(seed + releases, seed + (1 + MORE) * releases)
+    fresh = range(seed + releases, seed + (1 + FINALIST_FACTOR) * releases)
     again = [trials.compute(candidate.values, fresh) for candidate in trials.best(FINALISTS)]
     winner, each = min(again, key=lambda pair: float(pair[1].mean()))
     posterior = _posterior(parameters, trials, seed)

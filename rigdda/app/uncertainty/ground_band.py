@@ -36,13 +36,13 @@ from rigdda.envs.cost import judge
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]
 
-GROUNDS = 6
+DEFAULT_GROUNDS = 6
 """Default number of grounds."""
 
-RELEASES = 120
+RELEASES_PER_GROUND = 120
 """Number of releases of each layout on each ground."""
 
-SURE = 1.96
+CLEAR_ERRORS = 1.96
 """Standard errors from which two values of Z on the same releases count as different [-]."""
 
 State = Literal["cheapest", "undecided", "dearer"]
@@ -107,7 +107,7 @@ class GroundSample:
         if chosen.objective <= best.objective:
             return "cheapest"
         error = math.sqrt(float(noise((chosen.terms - best.terms)[None], self.strata)[0]))
-        dearer = chosen.objective - best.objective > SURE * error
+        dearer = chosen.objective - best.objective > CLEAR_ERRORS * error
         return "dearer" if dearer else "undecided"
 
 
@@ -215,7 +215,7 @@ def assess(
 def _seeds(problem: DesignProblem, seed: int) -> dict[str, Sequence[int]]:
     """Return the seeds of each event: the first of the verification, distributed as there."""
     events = len(problem.site.events)
-    count = max(RELEASES, 2 * events)
+    count = max(RELEASES_PER_GROUND, 2 * events)
     drawn = release_seeds("verification", seed, count)
     found: dict[str, list[int]] = {name: [] for name in problem.site.event_names}
     for name, own in zip(problem.plan(drawn), drawn, strict=True):

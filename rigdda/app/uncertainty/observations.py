@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Site, check
-from rigdda.agents.limits import RELEASES
+from rigdda.agents.limits import JOB_RELEASES
 from rigdda.app.reports.stations import QUANTITIES
 from rigdda.files import is_file
 from rigdda.files import read as read_text
@@ -25,7 +25,7 @@ from rigdda.passages import check_stations
 
 Floats = NDArray[np.float64]
 
-RUN_OUT, DEPOSIT = "run-out", "deposit"
+OBSERVED_RUN_OUT, DEPOSIT = "run-out", "deposit"
 
 AMOUNTS = ("share", "mass_t", "volume_m3")
 """Columns of which a deposit has one. Only the proportions between its intervals count."""
@@ -35,7 +35,7 @@ FORMS = (
 )
 """Columns of the three forms besides `event`."""
 
-LEAST = 3
+LEAST_VALUES = 3
 """Least number of observed values."""
 
 
@@ -69,7 +69,7 @@ class DataSet(NamedTuple):
     @property
     def name(self) -> str:
         """Name in tables: that of the event and, except for run-outs, the quantity."""
-        if self.quantity == RUN_OUT:
+        if self.quantity == OBSERVED_RUN_OUT:
             return self.event
         at = "" if math.isnan(self.station) else f" at {self.station:g} m"
         return f"{self.event}, {self.quantity}{at}"
@@ -111,10 +111,10 @@ def read(paths: Sequence[Path], site: Site) -> dict[str, DataSet]:
     for path in paths:
         for one in _read(path, site):
             if one.name in found:
-                mend = f"give the observations {one.name!r} in one file only"
-                raise BadInput("observed", str(path), mend)
+                hint = f"give the observations {one.name!r} in one file only"
+                raise BadInput("observed", str(path), hint)
             found[one.name] = one
-    if sum(len(one.values) for one in found.values()) < LEAST:
+    if sum(len(one.values) for one in found.values()) < LEAST_VALUES:
         raise BadInput("observed", str(paths[0]), "give three observed runs or more")
     return found
 
@@ -156,8 +156,8 @@ def _table(path: Path, only: str) -> tuple[list[str], list[list[str]]]:
         {"station_m", "quantity", "value"} <= set(names),
     )
     if sum(forms) != 1 or not ("event" in names or only):
-        mend = f"name its columns event and {FORMS} in the first row"
-        raise BadInput("observed", ", ".join(names), mend)
+        hint = f"name its columns event and {FORMS} in the first row"
+        raise BadInput("observed", ", ".join(names), hint)
     check.distinct("observed", names)
     return names, rows
 
@@ -166,12 +166,14 @@ def _rows(names: list[str], rows: list[list[str]]) -> Iterator[Row]:
     """Yield a name for each row of a table and its cells by column."""
     for i, row in enumerate(rows):
         if len(row) != len(names):
-            mend = f"give {len(names)} cells, one per column; use a decimal point in numbers"
-            raise BadInput(f"observed row {i + 1}", ",".join(row), mend)
+            hint = f"give {len(names)} cells, one per column; use a decimal point in numbers"
+            raise BadInput(f"observed row {i + 1}", ",".join(row), hint)
         yield f"observed row {i + 1}", dict(zip(names, row, strict=True))
 
 
-def _number(row: Row, name: str, low: float = -check.LARGEST, high: float = check.LARGEST) -> float:
+def _number(
+    row: Row, name: str, low: float = -check.LARGEST_NUMBER, high: float = check.LARGEST_NUMBER
+) -> float:
     """Return the number in a cell, between two limits."""
     where, text = f"{row[0]} {name}", row[1][name]
     try:
@@ -187,10 +189,10 @@ def _run_outs(rows: Sequence[Row], site: Site) -> list[DataSet]:
     for row in rows:
         value = _number(row, "run_out_m", site.slope.points[0][0], site.slope.points[-1][0])
         if value > site.road.end:
-            mend = f"move road.end beyond it: computed run-outs are cut off at {site.road.end:g} m"
-            raise BadInput(f"{row[0]} run_out_m", value, mend)
+            hint = f"move road.end beyond it: computed run-outs are cut off at {site.road.end:g} m"
+            raise BadInput(f"{row[0]} run_out_m", value, hint)
         found.setdefault(row[1]["event"], []).append(value)
-    return [DataSet(RUN_OUT, event, np.array(values)) for event, values in found.items()]
+    return [DataSet(OBSERVED_RUN_OUT, event, np.array(values)) for event, values in found.items()]
 
 
 def _passages(rows: Sequence[Row], site: Site) -> list[DataSet]:
@@ -201,7 +203,7 @@ def _passages(rows: Sequence[Row], site: Site) -> list[DataSet]:
         check_stations(site, (station,))
         quantity = row[1]["quantity"]
         check.one_of(f"{row[0]} quantity", quantity, tuple(QUANTITIES))
-        value = _number(row, "value", -check.LARGEST if "height" in quantity else 0.0)
+        value = _number(row, "value", -check.LARGEST_NUMBER if "height" in quantity else 0.0)
         found.setdefault((row[1]["event"], station, quantity), []).append(value)
     return [
         DataSet(quantity, event, np.array(values), station)
@@ -226,22 +228,22 @@ def _deposit(event: str, rows: list[tuple[Row, float, float, float]], amount: st
     ends = [rows[0][1]]
     for (where, _), start, end, _ in rows:
         if start != ends[-1]:
-            mend = f"let it begin at {ends[-1]:g}, where the interval before it ends; give 0 if "
-            raise BadInput(f"{where} start_m", start, f"{mend}there is no rock")
+            hint = f"let it begin at {ends[-1]:g}, where the interval before it ends; give 0 if "
+            raise BadInput(f"{where} start_m", start, f"{hint}there is no rock")
         if end == start:
             raise BadInput(f"{where} end_m", end, f"let the interval end beyond {start:g}")
         ends.append(end)
     amounts = np.array([row[3] for row in rows])
     if len(rows) < 2 or not amounts.any():
-        mend = "give two intervals or more, and rock in at least one"
-        raise BadInput(f"observed {amount} of {event}", amounts.tolist(), mend)
+        hint = "give two intervals or more, and rock in at least one"
+        raise BadInput(f"observed {amount} of {event}", amounts.tolist(), hint)
     counts = {row[0][1].get("releases", "1") for row in rows}
     if len(counts) > 1:
-        mend = "give the same number of releases in all rows of an event"
-        raise BadInput(f"observed releases of {event}", ", ".join(sorted(counts)), mend)
+        hint = "give the same number of releases in all rows of an event"
+        raise BadInput(f"observed releases of {event}", ", ".join(sorted(counts)), hint)
     (text,) = counts
     if not text.isdecimal():
         raise BadInput(f"{rows[0][0][0]} releases", text, "give a whole number")
-    count = check.integer(f"{rows[0][0][0]} releases", int(text), 1, RELEASES)
+    count = check.integer(f"{rows[0][0][0]} releases", int(text), 1, JOB_RELEASES)
     shares = amounts / amounts.sum()
     return DataSet(DEPOSIT, event, np.array(ends), math.nan, shares, count)

@@ -132,8 +132,8 @@ def _check_retired(path: str) -> None:
     """
     top, last = path.partition(".")[0], path.rpartition(".")[2]
     if top in ("surfaces", "interfaces") and last in RETIRED:
-        mend = f"name {path.rpartition('.')[0]}.{last.replace('damping', 'rolling')}: damping was "
-        raise BadInput("--parameters", path, mend + "replaced by rolling resistance")
+        hint = f"name {path.rpartition('.')[0]}.{last.replace('damping', 'rolling')}: damping was "
+        raise BadInput("--parameters", path, hint + "replaced by rolling resistance")
 
 
 def check_once(parameters: Sequence[Parameter]) -> None:
@@ -255,8 +255,8 @@ def _set(site: Site, tables: dict[str, Any], path: str, value: float) -> None:
     top, last = path.partition(".")[0], path.rpartition(".")[2]
     _check_retired(path)
     if path == "motion.damping" and site.motion.damping_when == "contact":
-        mend = "name surfaces.NAME.rolling: damping in contact was replaced by rolling resistance"
-        raise BadInput("--parameters", path, mend)
+        hint = "name surfaces.NAME.rolling: damping in contact was replaced by rolling resistance"
+        raise BadInput("--parameters", path, hint)
     if path == "prices.level":
         return _scale_prices(tables, value)
     table = _table(site, tables, path)
@@ -273,8 +273,8 @@ def _set(site: Site, tables: dict[str, Any], path: str, value: float) -> None:
 
 
 def _unknown(path: str) -> BadInput:
-    mend = "name a number of the site file, such as surfaces.soil.restitution"
-    return BadInput("--parameters", path, mend)
+    hint = "name a number of the site file, such as surfaces.soil.restitution"
+    return BadInput("--parameters", path, hint)
 
 
 def _table(site: Site, tables: dict[str, Any], path: str) -> dict[str, Any] | None:
@@ -310,8 +310,8 @@ def _scale_blocks(path: str, top: str, table: dict[str, Any], factor: float) -> 
     area, length = factor**VOLUME_EXPONENT, factor ** (VOLUME_EXPONENT / 2.0)
     if top == "events":
         if table["area"] is None:
-            mend = f"name sources.{table['source']}.size: the source determines the blocks"
-            raise BadInput("--parameters", path, mend)
+            hint = f"name sources.{table['source']}.size: the source determines the blocks"
+            raise BadInput("--parameters", path, hint)
         table["area"] = [area * value for value in table["area"]]
     elif table["edges"] is not None:
         table["edges"] = [length * edge for edge in table["edges"]]
@@ -320,8 +320,8 @@ def _scale_blocks(path: str, top: str, table: dict[str, Any], factor: float) -> 
     elif table["joints"]:
         table["joints"] = [j | {"spacing": length * j["spacing"]} for j in table["joints"]]
     else:
-        mend = "leave it out: the blocks of this source are surveyed, or its events determine them"
-        raise BadInput("--parameters", path, mend)
+        hint = "leave it out: the blocks of this source are surveyed, or its events determine them"
+        raise BadInput("--parameters", path, hint)
 
 
 WEIGHT = "weight"
@@ -406,11 +406,11 @@ def read_posterior(path: Path, site: Site) -> Posterior:
         table = np.array([[check.parsed(cell) for cell in row] for row in rows], dtype=np.float64)
     except (ValueError, csv.Error):
         table, head = np.zeros(0), [""]
-    mend = "give a column weight and one for each number, with finite numbers and weights above 0"
+    hint = "give a column weight and one for each number, with finite numbers and weights above 0"
     if table.ndim != 2 or head[0] != WEIGHT or table.shape[1] != len(head) or len(head) < 2:
-        raise BadInput("--posterior", str(path), mend)
+        raise BadInput("--posterior", str(path), hint)
     if not np.isfinite(table).all() or (table[:, 0] < 0.0).any() or not table[:, 0].any():
-        raise BadInput("--posterior", str(path), mend)
+        raise BadInput("--posterior", str(path), hint)
     check.distinct("--posterior", head)
     for ends in (table.min(axis=0), table.max(axis=0)):
         set_numbers(site, head[1:], ends[1:].tolist())

@@ -21,16 +21,16 @@ NEAREST = 0.6
 """Share of the tried places with the best scores to which the process is fitted; the others are far
 from the least score, where the surface has another scale [-]."""
 
-FEWEST = 12
+LEAST_PLACES = 12
 """Least number of places to which the process is fitted, if there are as many."""
 
 CANDIDATES = 4096
 """Number of places among which the least score is sought, in each of two stages."""
 
-TOGETHER = 250
+SAMPLE_BATCH = 250
 """Number of samples of the scores that are treated together, to save memory."""
 
-MARGIN = 0.25
+BOX_MARGIN = 0.25
 """Margin of the box of the second stage about the places found in the first [-], relative to it."""
 
 
@@ -51,7 +51,7 @@ def best_places(places: Floats, scores: Floats, rng: np.random.Generator) -> Flo
         Random generator of the noise.
     """
     middle = scores.mean(axis=1)
-    count = min(len(places), max(FEWEST, round(NEAREST * len(places))))
+    count = min(len(places), max(LEAST_PLACES, round(NEAREST * len(places))))
     near = np.argsort(middle, kind="stable")[:count]
     places, scores, middle = places[near], scores[near], middle[near]
     lengths, amplitude, noisy = _scales(places, middle)
@@ -61,7 +61,7 @@ def best_places(places: Floats, scores: Floats, rng: np.random.Generator) -> Flo
                        places])  # fmt: skip
     found = _least(places, scores + noise, lengths, share, first)
     low, high = found.min(axis=0), found.max(axis=0)
-    room = MARGIN * (high - low) + 1e-3
+    room = BOX_MARGIN * (high - low) + 1e-3
     box = np.clip(low - room, 0.0, 1.0), np.clip(high + room, 0.0, 1.0)
     second = np.vstack([_points(places.shape[1], *box), first])
     return _least(places, scores + noise, lengths, share, second)
@@ -79,7 +79,7 @@ def _covariance(a: Floats, b: Floats, lengths: Floats) -> Floats:
     return np.asarray((1.0 + r + r * r / 3.0) * np.exp(-r), dtype=np.float64)
 
 
-SHORTEST, LONGEST = 0.05, 10.0
+SHORTEST_SCALE, LONGEST_SCALE = 0.05, 10.0
 """Least and greatest length on which scores change, relative to the range of a parameter [-]."""
 
 QUIETEST, LOUDEST = 1e-4, 1.0
@@ -103,7 +103,7 @@ def _scales(places: Floats, scores: Floats) -> tuple[Floats, float, float]:
         fitted = float(values @ cho_solve(factor, values))
         return 0.5 * fitted + float(np.log(np.diag(factor[0])).sum())
 
-    bounds = [(math.log(SHORTEST), math.log(LONGEST))] * dimensions
+    bounds = [(math.log(SHORTEST_SCALE), math.log(LONGEST_SCALE))] * dimensions
     bounds += [(math.log(0.1), math.log(100.0)), (math.log(QUIETEST), math.log(LOUDEST))]
     starts = [
         np.array([math.log(length)] * dimensions + [0.0, math.log(0.1)]) for length in (0.3, 1.0)
@@ -123,7 +123,7 @@ def _least(places: Floats, scores: Floats, lengths: Floats, share: float, points
     weights = cho_solve(cho_factor(matrix, lower=True), scores - scores.mean(axis=0))
     cross = _covariance(points, places, lengths)
     best = [
-        np.argmin(cross @ weights[:, i : i + TOGETHER], axis=0)
-        for i in range(0, scores.shape[1], TOGETHER)
+        np.argmin(cross @ weights[:, i : i + SAMPLE_BATCH], axis=0)
+        for i in range(0, scores.shape[1], SAMPLE_BATCH)
     ]
     return points[np.concatenate(best)]

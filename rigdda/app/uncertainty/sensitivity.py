@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Layout, Site, check
-from rigdda.agents.limits import RELEASES
+from rigdda.agents.limits import JOB_RELEASES
 from rigdda.app.uncertainty.parameters import Input, Parameter, site_at
 from rigdda.app.uncertainty.varied_sites import (
     PARTS,
@@ -60,7 +60,7 @@ METHODS = ("morris", "sobol")
 SAMPLES = {"morris": 20, "sobol": 64}
 """Default number of trajectories, and of points from which the indices of Sobol' are computed."""
 
-LEVELS = 4
+MORRIS_LEVELS = 4
 """Levels of each input in the method of Morris."""
 
 RESAMPLES = 500
@@ -159,12 +159,14 @@ def places(method: Method, dimensions: int, samples: int, seed: int) -> Floats:
         If there is no such method, or the number of samples is not a power of two for Sobol'.
     """
     check.one_of("--method", method, METHODS)
-    count = check.integer("--samples", samples, 2, RELEASES)
+    count = check.integer("--samples", samples, 2, JOB_RELEASES)
     problem = _problem(dimensions)
     if method == "morris":
         from SALib.sample import morris
 
-        return np.asarray(morris.sample(problem, count, LEVELS, seed=seed + 1), dtype=np.float64)
+        return np.asarray(
+            morris.sample(problem, count, MORRIS_LEVELS, seed=seed + 1), dtype=np.float64
+        )
     if count & (count - 1):
         near = 1 << round(math.log2(count))
         raise BadInput("--samples", count, f"give a power of two for sobol, such as {near}")
@@ -236,10 +238,10 @@ def _morris(cube: Floats, values: Floats, pairs: Sequence[Pair], seed: int) -> l
     from SALib.analyze import morris
 
     found = morris.analyze(
-        _problem(cube.shape[1]), cube, values, num_levels=LEVELS, num_resamples=RESAMPLES,
+        _problem(cube.shape[1]), cube, values, num_levels=MORRIS_LEVELS, num_resamples=RESAMPLES,
         conf_level=CONFIDENCE, seed=seed + 1,
     )  # fmt: skip
-    step = LEVELS / (2.0 * (LEVELS - 1.0))
+    step = MORRIS_LEVELS / (2.0 * (MORRIS_LEVELS - 1.0))
     count = len(values) // (cube.shape[1] + 1)
     out = []
     for i, (change, variance, signal) in enumerate(pairs):
@@ -429,14 +431,14 @@ def seeds_of(site: Site, releases: int, seed: int) -> Seeds:
         If there are fewer than two releases per event.
     """
     least = 2 * len(site.events)
-    count = check.integer("--releases", releases, least, RELEASES)
+    count = check.integer("--releases", releases, least, JOB_RELEASES)
     shared = DesignProblem(site).allocation(count)
     design = {event.name for event in site.events if event.design}
-    found = {n: max(shared[n], count // LEAST if n in design else 0) for n in shared}
+    found = {n: max(shared[n], count // EVENT_DIVISOR if n in design else 0) for n in shared}
     return {name: range(seed, seed + n) for name, n in found.items()}
 
 
-LEAST = 4
+EVENT_DIVISOR = 4
 """A design event has at least the number of releases divided by this, for its probabilities."""
 
 

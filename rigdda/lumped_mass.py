@@ -214,20 +214,20 @@ def _follow(
         key = corners.tobytes()
         grounds[key] = corners, surfaces
         members.setdefault(key, []).append(i)
-    found, every = np.zeros((len(starts), 3)), list(site.surfaces)
+    ends, every = np.zeros((len(starts), 3)), list(site.surfaces)
     for key, (corners, surfaces) in grounds.items():
-        own, laws = members[key], np.array([law(site, name) for name in surfaces])
-        each = np.repeat(laws[None], len(own), axis=0)
-        off = shifts[own][:, [every.index(name) for name in surfaces]]
+        points, laws = members[key], np.array([law(site, name) for name in surfaces])
+        each = np.repeat(laws[None], len(points), axis=0)
+        off = shifts[points][:, [every.index(name) for name in surfaces]]
         angles = np.clip(each[:, :, FRICTION] + off[:, :, 0], 0.0, STEEPEST_DEG)
         each[:, :, FRICTION] = np.tan(np.radians(angles))
         each[:, :, NORMAL] = np.clip(each[:, :, NORMAL] + off[:, :, 1], 0.0, 1.0)
-        moved, results = starts[own], np.zeros((len(own), 3))
+        moved, results = starts[points], np.zeros((len(points), 3))
         level = np.interp(moved[:, 0], *corners.T)
         moved[:, 1] = np.maximum(moved[:, 1], level)  # a thin slab may lie below this ground
         trajectories(np.array(corners), each, moved, EARTH, site.road.start, results)
-        found[own] = results
-    return found
+        ends[points] = results
+    return ends
 
 
 def law(site: Site, name: str) -> tuple[float, float, float]:
@@ -236,7 +236,11 @@ def law(site: Site, name: str) -> tuple[float, float, float]:
     usual = Rebound(
         surface.restitution or 0.0, friction_deg=min(surface.friction_deg, STEEPEST_DEG)
     )
-    own = site.lumped.get(name, usual)
-    found = [math.nan] * 3
-    found[NORMAL], found[TANGENTIAL], found[FRICTION] = own.normal, own.tangential, own.friction_deg
-    return found[0], found[1], found[2]
+    rebound = site.lumped.get(name, usual)
+    numbers = [math.nan] * 3
+    numbers[NORMAL], numbers[TANGENTIAL], numbers[FRICTION] = (
+        rebound.normal,
+        rebound.tangential,
+        rebound.friction_deg,
+    )
+    return numbers[0], numbers[1], numbers[2]

@@ -254,18 +254,18 @@ DRAWS_PER_LAYOUT = 20
 
 
 def _drawn(
-    problem: DesignProblem, menu: Menu, rng: np.random.Generator, found: dict[Layout, str]
+    problem: DesignProblem, menu: Menu, rng: np.random.Generator, known: dict[Layout, str]
 ) -> Iterator[tuple[str, Layout]]:
     """Yield layouts that are drawn in turn from the catalogue, at random and from neighbours."""
     lists = [menu.singles(kind) for kind in problem.kinds if kind != "wall"]
-    lists = [own for own in lists if own]
+    lists = [singles for singles in lists if singles]
     step = (problem.zone.end - problem.zone.start) / 16.0
     while True:
         if lists:
-            own = lists[rng.integers(len(lists))]
-            yield "single", (own[rng.integers(len(own))],)
+            singles = lists[rng.integers(len(lists))]
+            yield "single", (singles[rng.integers(len(singles))],)
         yield "random", problem.decode(rng.uniform(*problem.bounds))
-        earlier = list(found)[rng.integers(len(found))]
+        earlier = list(known)[rng.integers(len(known))]
         around = list(menu.neighbours(earlier, step, 1))
         if around:
             yield "neighbour", around[rng.integers(len(around))]

@@ -405,15 +405,15 @@ def _candidates(problem: ArchivedProblem, kept: Archive) -> dict[Layout, ScoredL
     spent = {
         name: (bare.harm + bare.repair)[bare.event == name] for name in problem.site.event_names
     }
-    found = {}
-    for own in kept.releases:
-        layout = archive.layout_of(own.barriers)
-        pairs = list(zip(own.seeds, own.outcomes, strict=True))
+    candidates = {}
+    for releases in kept.releases:
+        layout = archive.layout_of(releases.barriers)
+        pairs = list(zip(releases.seeds, releases.outcomes, strict=True))
         streams = [[o for seed, o in pairs if seed % len(STREAMS) == k] for k in VERIFIED]
         checked = next(filter(None, streams), [])
-        outcomes = tuple(checked or own.outcomes)
-        found[layout] = _candidate(problem, layout, outcomes, bool(checked), spent)
-    return found
+        outcomes = tuple(checked or releases.outcomes)
+        candidates[layout] = _candidate(problem, layout, outcomes, bool(checked), spent)
+    return candidates
 
 
 FEW_RELEASES = 8
@@ -435,12 +435,12 @@ def _candidate(
     The sample of each event is extended by one release that deviates from the mean by the standard
     deviation without barriers, because none of n releases does not mean never.
     """
-    site, own = problem.site, account(problem.site, layout, outcomes)
+    site, costs = problem.site, account(problem.site, layout, outcomes)
     value, variance = site.annual(layout), 0.0
     chances: dict[str, tuple[Estimate, Estimate]] = {}
     for event in site.events:
-        which, without = own.event == event.name, spent[event.name]
-        bills, n = (own.harm + own.repair)[which], int(which.sum())
+        which, without = costs.event == event.name, spent[event.name]
+        bills, n = (costs.harm + costs.repair)[which], int(which.sum())
         rate = site.rate(event.name, layout)
         more = max(FEW_RELEASES - n, 0)
         mean = (float(bills.sum()) + more * float(without.mean())) / (n + more)
@@ -448,11 +448,11 @@ def _candidate(
         value += rate * mean
         variance += rate**2 * squares / (n + more) ** 2
         if event.design:
-            counts = int(own.reached[which].sum()), int(own.failed[which].sum())
+            counts = int(costs.reached[which].sum()), int(costs.failed[which].sum())
             chances[event.name] = estimate(counts[0], n), estimate(counts[1], n)
     risk = None
-    if problem.targets.individual is not None and own.toll is not None:
-        killed = {name: own.toll[own.event == name, 2].tolist() for name in site.event_names}
+    if problem.targets.individual is not None and costs.toll is not None:
+        killed = {name: costs.toll[costs.event == name, 2].tolist() for name in site.event_names}
         risk = problem.individual_risk(layout, killed)
     ends: tuple[End, ...] = ("upper", "value", "lower")
     over = [_excess(problem.targets, chances, risk, end) for end in ends]

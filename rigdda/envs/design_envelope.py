@@ -180,17 +180,17 @@ def _simulate(
     for name in governing_events(site):
         first = FIRST_SEED + seed * 2**20
         releases = [(first + i, name) for i in range(math.ceil(blocks / largest(site, name)))]
-        found = passages(site, layout, releases, at)
-        while len(found.stops) < blocks:  # events with a random number of blocks
-            more = math.ceil((blocks - len(found.stops)) / len(found.stops) * len(releases))
+        crossed = passages(site, layout, releases, at)
+        while len(crossed.stops) < blocks:  # events with a random number of blocks
+            more = math.ceil((blocks - len(crossed.stops)) / len(crossed.stops) * len(releases))
             start = first + len(releases)
             new = [(start + i, name) for i in range(more)]
-            found = Passages.join([found, passages(site, layout, new, at)])
+            crossed = Passages.join([crossed, passages(site, layout, new, at)])
             releases += new
-        block = _blocks(found.table)
-        over = block[found.table["station"] == len(at) - 1]
-        events.append(_event(site, name, found, len(lines), len(over), level))
-        risky = found.table[np.isin(block, over)]
+        block = _blocks(crossed.table)
+        over = block[crossed.table["station"] == len(at) - 1]
+        events.append(_event(site, name, crossed, len(lines), len(over), level))
+        risky = crossed.table[np.isin(block, over)]
         through += np.bincount(risky["station"], minlength=len(at))[: len(lines)]
         reached += len(over)
     return DesignEnvelope(lines, level, events, (through / max(reached, 1)).tolist())
@@ -202,24 +202,24 @@ def _blocks(table: NDArray[np.void]) -> NDArray[np.int64]:
 
 
 def _event(
-    site: Site, name: str, found: Passages, count: int, reaching: int, level: float
+    site: Site, name: str, crossed: Passages, count: int, reaching: int, level: float
 ) -> EventEnvelope:
     """Return the envelope of the releases of an event at the first `count` stations."""
-    own = [found.at(k) for k in range(count)]
-    speeds = [np.hypot(rows["vx"], rows["vy"]) for rows in own]
+    rows_at = [crossed.at(k) for k in range(count)]
+    speeds = [np.hypot(rows["vx"], rows["vy"]) for rows in rows_at]
     traits = [
         (block.density, *_size(block.vertices))
-        for seed in found.seed
+        for seed in crossed.seed
         for block in site.draw(seed, name).blocks
     ]
     density, area, radius = np.array(traits).T
-    passing = np.array([len(rows) for rows in own], dtype=np.float64)
-    lines = found.stations[:count]
+    passing = np.array([len(rows) for rows in rows_at], dtype=np.float64)
+    lines = crossed.stations[:count]
 
     def quantile(values: Sequence[Floats]) -> list[Quantile]:
         raw = [
-            quantiles(_sample(v, rows, found), [level])[0]
-            for v, rows in zip(values, own, strict=True)
+            quantiles(_sample(v, rows, crossed), [level])[0]
+            for v, rows in zip(values, rows_at, strict=True)
         ]
         table = _complete(np.array(raw))
         smooth = [np.fmax(column, smoothed(lines, column, passing)) for column in table.T]
@@ -227,12 +227,12 @@ def _event(
 
     return EventEnvelope(
         name=name,
-        releases=len(found.seed),
-        blocks=len(found.stops),
+        releases=len(crossed.seed),
+        blocks=len(crossed.stops),
         reaching=reaching,
-        passing=[len(rows) for rows in own],
+        passing=[len(rows) for rows in rows_at],
         speed=quantile(speeds),
-        height=quantile([rows["height"] for rows in own]),
+        height=quantile([rows["height"] for rows in rows_at]),
         mass=float(np.quantile(density * area**1.5, level)),
         radius=float(radius.mean()),
     )

@@ -44,27 +44,27 @@ def polyline(path: Path, layer: str | None = None) -> tuple[Floats, tuple[str, .
         If ezdxf is not installed, the file is no DXF drawing or is not in metres, or the drawing
         has no polyline, or has several and `layer` does not name the layer of one.
     """
-    unit, found = _polylines(path)
-    if not found:
+    unit, lines = _polylines(path)
+    if not lines:
         hint = "draw the profile as one polyline in model space, and join lines into a polyline"
         raise BadInput("--profile", str(path), hint)
-    layers = [line.dxf.layer for line in found]
+    layers = [line.dxf.layer for line in lines]
     if layer is not None:
-        found = [line for line in found if line.dxf.layer == layer]
-        if len(found) != 1:
+        lines = [line for line in lines if line.dxf.layer == layer]
+        if len(lines) != 1:
             names = ", ".join(sorted(set(layers)))
             hint = f"name a layer with one polyline; the drawing has polylines on {names}"
             raise BadInput("--layer", layer, hint)
-    if len(found) > 1:
+    if len(lines) > 1:
         names = ", ".join(sorted(set(layers)))
         hint = f"name the layer of the profile by --layer; there are polylines on {names}"
-        raise BadInput("--profile", f"{len(found)} polylines", hint)
+        raise BadInput("--profile", f"{len(lines)} polylines", hint)
     if unit not in (0, 6):
         name = UNITS.get(unit, f"unit {unit}")
         hint = "scale it to metres, or set its unit to metres if it is drawn in metres"
         raise BadInput("--profile", f"a drawing in {name} ($INSUNITS = {unit})", hint)
     notes = () if unit else ("the drawing names no unit ($INSUNITS): metres are assumed",)
-    return _vertices(path, found[0]), notes
+    return _vertices(path, lines[0]), notes
 
 
 def _polylines(path: Path) -> tuple[int, list[Any]]:

@@ -165,16 +165,16 @@ def check_clear(scene: Scene, ground: Terrain) -> None:
         If one does.
     """
     free = {i: block.vertices for i, block in enumerate(scene.blocks) if not block.fixed}
-    found = in_ground(ground, list(free.values()))
-    if found is not None:
-        i = list(free)[found.block]
-        hint = f"raise it: it overlaps the ground by {found.shared:.3g} m2"
+    overlap = in_ground(ground, list(free.values()))
+    if overlap is not None:
+        i = list(free)[overlap.block]
+        hint = f"raise it: it overlaps the ground by {overlap.shared:.3g} m2"
         raise BadInput(f"blocks[{i}]", scene.blocks[i].vertices.tolist(), hint)
     for j in scene.bodies:
-        found = deepest(scene.outline(j), list(free.values()))
-        if found is not None:
-            i = list(free)[found.block]
-            hint = f"move it: it overlaps block {i} by {found.shared:.3g} m2"
+        overlap = deepest(scene.outline(j), list(free.values()))
+        if overlap is not None:
+            i = list(free)[overlap.block]
+            hint = f"move it: it overlaps block {i} by {overlap.shared:.3g} m2"
             raise BadInput(f"barriers[{j}].x", scene.barriers[j].x, hint)
 
 

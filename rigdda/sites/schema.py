@@ -46,15 +46,15 @@ def _plain(part: Any) -> Any:
         return [_plain(one) for one in part]
     if not isinstance(part, dict):
         return part
-    found = {key: _plain(one) for key, one in part.items() if one is not None}
-    if isinstance(found.get("description"), str):  # that of a table is its docstring
-        found["description"] = summary(found["description"])
-    kinds = [one for one in found.get("anyOf", ()) if one != {"type": "null"}]
+    plain = {key: _plain(one) for key, one in part.items() if one is not None}
+    if isinstance(plain.get("description"), str):  # that of a table is its docstring
+        plain["description"] = summary(plain["description"])
+    kinds = [one for one in plain.get("anyOf", ()) if one != {"type": "null"}]
     if len(kinds) == 1:
-        del found["anyOf"]
-        found = kinds[0] | found
-    if "prefixItems" in found:  # all members are of one type
-        found["items"] = found.pop("prefixItems")[0]
-    if "$ref" in found and len(found) > 1:  # draft 7 ignores the siblings of a reference
-        found["allOf"] = [{"$ref": found.pop("$ref")}]
-    return found
+        del plain["anyOf"]
+        plain = kinds[0] | plain
+    if "prefixItems" in plain:  # all members are of one type
+        plain["items"] = plain.pop("prefixItems")[0]
+    if "$ref" in plain and len(plain) > 1:  # draft 7 ignores the siblings of a reference
+        plain["allOf"] = [{"$ref": plain.pop("$ref")}]
+    return plain

@@ -66,28 +66,28 @@ def share(plan: CorridorPlan, gain: float) -> float:
 def budget_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
     """Return one row for each budget and method [EUR, EUR/year]."""
     rows = []
-    for own in plan.plans:
-        limit = "unlimited" if own is plan.unlimited else own.budget
-        for name, found in {OPTIMUM: own.evaluation, **own.methods}.items():
-            ahead = plan.problem.ahead(own.evaluation, found)
+    for budget_plan in plan.plans:
+        limit = "unlimited" if budget_plan is plan.unlimited else budget_plan.budget
+        for name, evaluation in {OPTIMUM: budget_plan.evaluation, **budget_plan.methods}.items():
+            ahead = plan.problem.ahead(budget_plan.evaluation, evaluation)
             rows.append(
                 {
                     "budget": limit,
                     "method": name,
-                    "spent": found.cost,
-                    "gain": found.gain,
-                    "gain_low": found.gain_ci[0],
-                    "gain_high": found.gain_ci[1],
-                    "share_of_unlimited": share(plan, found.gain),
+                    "spent": evaluation.cost,
+                    "gain": evaluation.gain,
+                    "gain_low": evaluation.gain_ci[0],
+                    "gain_high": evaluation.gain_ci[1],
+                    "share_of_unlimited": share(plan, evaluation.gain),
                     "behind": ahead.value,
                     "behind_low": ahead.low,
                     "behind_high": ahead.high,
-                    "objective": found.objective,
-                    "objective_low": found.ci[0],
-                    "objective_high": found.ci[1],
-                    "annual_cost_of_barriers": found.annual,
-                    "sections_built": sum(bool(e.layout) for e in found.sections),
-                    "shadow_price": own.shadow_price if name == OPTIMUM else "",
+                    "objective": evaluation.objective,
+                    "objective_low": evaluation.ci[0],
+                    "objective_high": evaluation.ci[1],
+                    "annual_cost_of_barriers": evaluation.annual,
+                    "sections_built": sum(bool(e.layout) for e in evaluation.sections),
+                    "shadow_price": budget_plan.shadow_price if name == OPTIMUM else "",
                 }
             )
     return rows
@@ -171,18 +171,18 @@ def table_of_budgets(plan: CorridorPlan) -> Table:
     out = empty_table(
         ("budget", "spent", "gain (95 %)", "share", "same", "worst", "ratio", "1 EUR")
     )
-    for own in plan.plans:
-        limit = "unlimited" if own is plan.unlimited else thousands(own.budget)
-        found = own.evaluation
-        simple = [percent(share(plan, e.gain)) for e in own.methods.values()]
-        low, high = found.gain_ci
+    for budget_plan in plan.plans:
+        limit = "unlimited" if budget_plan is plan.unlimited else thousands(budget_plan.budget)
+        best = budget_plan.evaluation
+        simple = [percent(share(plan, e.gain)) for e in budget_plan.methods.values()]
+        low, high = best.gain_ci
         out.add_row(
             limit,
-            thousands(found.cost),
-            f"{thousands(found.gain)} ({thousands(low, 'down')} to {thousands(high, 'up')})",
-            percent(share(plan, found.gain)),
+            thousands(best.cost),
+            f"{thousands(best.gain)} ({thousands(low, 'down')} to {thousands(high, 'up')})",
+            percent(share(plan, best.gain)),
             *simple,
-            f"{own.shadow_price:.2g}",
+            f"{budget_plan.shadow_price:.2g}",
         )
     return out
 
@@ -230,16 +230,17 @@ def draw_gain(path: Path, plan: CorridorPlan) -> None:
     """Draw the gain of each method against the budget, with 95 % bands."""
     import matplotlib.pyplot as plt
 
-    budgets = np.array([own.budget for own in plan.plans[:-1]])
+    budgets = np.array([each.budget for each in plan.plans[:-1]])
     with plt.rc_context(FONT):
         figure, axes = plt.subplots(figsize=(8.0, 5.0))
         for name, (colour, marker) in STYLES.items():
-            found = [
-                own.evaluation if name == OPTIMUM else own.methods[name] for own in plan.plans[:-1]
+            evaluations = [
+                each.evaluation if name == OPTIMUM else each.methods[name]
+                for each in plan.plans[:-1]
             ]
-            gain = np.array([e.gain for e in found]) / 1e3
+            gain = np.array([e.gain for e in evaluations]) / 1e3
             if name == OPTIMUM:
-                low, high = np.array([e.gain_ci for e in found]).T / 1e3
+                low, high = np.array([e.gain_ci for e in evaluations]).T / 1e3
                 axes.fill_between(budgets / 1e3, low, high, color=colour, alpha=0.15, linewidth=0)
             axes.plot(budgets / 1e3, gain, color=colour, marker=marker, markersize=5,
                       linewidth=2.0 if name == OPTIMUM else 1.2, label=name)  # fmt: skip
@@ -279,16 +280,16 @@ def draw_strip(path: Path, plan: CorridorPlan) -> None:
         below.bar(starts, before, lengths, align="edge", color="0.85", edgecolor="white",
                   linewidth=0.5, label="without barriers")  # fmt: skip
         shades = {(len(plans) - 1) // 2: 0.45, len(plans) - 1: 1.0}
-        for own, shade in ((plans[i], shade) for i, shade in shades.items()):
-            left = np.array([e.harm + e.repair for e in own.evaluation.sections])
+        for each, shade in ((plans[i], shade) for i, shade in shades.items()):
+            left = np.array([e.harm + e.repair for e in each.evaluation.sections])
             below.step(np.append(starts, ends[-1]), np.append(left, left[-1]), where="post",
                        color=ROAD, alpha=shade, linewidth=1.6,
-                       label=f"risk left with {thousands(own.budget)} thousand EUR")  # fmt: skip
+                       label=f"risk left with {thousands(each.budget)} thousand EUR")  # fmt: skip
         below.set_ylabel("cost [EUR per m and year]")
         below.legend(frameon=False, fontsize=9, ncol=3, loc="lower left", bbox_to_anchor=(0, 1))
-        for row, own in enumerate(plans):
-            _row(above, row, own, starts.tolist(), lengths.tolist(), colours)
-        above.set_yticks(range(len(plans)), [f"{thousands(own.budget)}" for own in plans])
+        for row, each in enumerate(plans):
+            _row(above, row, each, starts.tolist(), lengths.tolist(), colours)
+        above.set_yticks(range(len(plans)), [f"{thousands(each.budget)}" for each in plans])
         above.set_ylim(-0.6, len(plans) - 0.4)
         above.set_ylabel("budget [thousand EUR]")
         above.set_xlabel("distance along the road [m]")
@@ -299,7 +300,7 @@ def draw_strip(path: Path, plan: CorridorPlan) -> None:
                              rotation=90 if len(corridor.sections) > 14 else 30, fontsize=size,
                              ha="center" if len(corridor.sections) > 14 else "left")  # fmt: skip
             names.tick_params(length=0)
-        used = {b.kind for own in plans for e in own.evaluation.sections for b in e.layout}
+        used = {b.kind for each in plans for e in each.evaluation.sections for b in e.layout}
         marks = [Patch(color=colours[kind], label=kind.replace("_", " "))
                  for kind in KINDS if kind in used]  # fmt: skip
         figure.legend(handles=marks, frameon=False, loc="lower center", ncol=len(marks) or 1)

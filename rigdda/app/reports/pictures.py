@@ -559,15 +559,15 @@ def _envelopes(
     energies: Axes,
     site: Site,
     layout: Layout,
-    found: Sequence[PassageEnvelope],
+    drawn: Sequence[PassageEnvelope],
     words: str,
 ) -> None:
     """Draw the envelopes of height and energy, and the height and class of the barriers."""
-    for own in found:
-        for axes, lines in ((heights, own.height), (energies, own.energy)):
-            colour = colour_of(site, own.event)
-            draw_quantile(axes, own.stations, lines[0], lines[2], color=colour)
-            axes.fill_between(own.stations, lines[1], lines[2], color=colour, alpha=0.2, lw=0)
+    for envelope in drawn:
+        for axes, lines in ((heights, envelope.height), (energies, envelope.energy)):
+            colour = colour_of(site, envelope.event)
+            draw_quantile(axes, envelope.stations, lines[0], lines[2], color=colour)
+            axes.fill_between(envelope.stations, lines[1], lines[2], color=colour, alpha=0.2, lw=0)
     for axes in (heights, energies):
         axes.axvspan(site.road.start, site.road.end, color=ROAD, alpha=0.2, lw=0)
         axes.grid(alpha=0.25)
@@ -585,7 +585,7 @@ def _envelopes(
             energies.plot(barrier.x, takes, "D", color=colour, markersize=8)
         else:
             energies.axvline(barrier.x, color=colour, linewidth=1, linestyle=":")
-    if any((own.energy[0] > 0.0).any() for own in found):  # otherwise there are no curves
+    if any((envelope.energy[0] > 0.0).any() for envelope in drawn):  # otherwise there are no curves
         plain_log(energies)
     heights.set_ylim(bottom=0.0)
     heights.set_title(f"{words}: 95 % quantile of block tops [m above ground]",

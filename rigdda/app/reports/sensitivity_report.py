@@ -157,22 +157,22 @@ def explain(found: Sensitivity) -> str:
     return words + (f"; no influence at all: {', '.join(none)}" if none else "")
 
 
-def draw(path: Path, found: Sensitivity) -> None:
+def draw(path: Path, result: Sensitivity) -> None:
     """Write the tornado picture: changes of each output and indices with intervals and noise."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    shown = list(zip(found.outputs, found.indices, strict=True))
+    shown = list(zip(result.outputs, result.indices, strict=True))
     shown = [(o, i) for o, i in shown if any(one.index > 0.0 for one in i)][:PANELS] or shown[:1]
-    ranked = [_ranked(found.plan.inputs, indices)[:SHOWN] for _, indices in shown]
-    ranked = [[pair for pair in own if pair[1].index > 0.0] or own[:1] for own in ranked]
-    heights = [0.3 * len(own) + 1.0 for own in ranked]
+    ranked = [_ranked(result.plan.inputs, indices)[:SHOWN] for _, indices in shown]
+    ranked = [[pair for pair in pairs if pair[1].index > 0.0] or pairs[:1] for pairs in ranked]
+    heights = [0.3 * len(pairs) + 1.0 for pairs in ranked]
     with rc_context(FONT):
         figure = Figure((11.0, sum(heights) + 0.6), dpi=DPI, layout="constrained")
         grid = figure.subplots(len(shown), 2, squeeze=False, sharey="row", height_ratios=heights)
-        for (left, right), (output, _), own in zip(grid, shown, ranked, strict=True):
-            _tornado(left, output, own)
-            _indices(right, found, own)
+        for (left, right), (output, _), pairs in zip(grid, shown, ranked, strict=True):
+            _tornado(left, output, pairs)
+            _indices(right, result, pairs)
         figure.legend(*_key(), loc="outside lower center", ncols=3, frameon=False)
         save(figure, path)
 

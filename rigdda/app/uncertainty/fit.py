@@ -145,15 +145,15 @@ def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
     Diverged
         If a simulation diverges.
     """
-    found = passages(site, (), [(seed, one.event) for seed in seeds], ())
+    crossed = passages(site, (), [(seed, one.event) for seed in seeds], ())
     low, high = one.values[0], one.values[-1]
-    stops = found.stops[(found.stops["x"] >= low) & (found.stops["x"] <= high)]
-    mass = np.zeros(len(found.seed))
+    stops = crossed.stops[(crossed.stops["x"] >= low) & (crossed.stops["x"] <= high)]
+    mass = np.zeros(len(crossed.seed))
     np.add.at(mass, stops["release"], stops["mass"])
     above = np.zeros((len(mass), len(one.values) - 2))
     for j, end in enumerate(one.values[1:-1]):
-        own = stops[stops["x"] <= end]
-        np.add.at(above[:, j], own["release"], own["mass"])
+        below = stops[stops["x"] <= end]
+        np.add.at(above[:, j], below["release"], below["mass"])
     share = above.sum(axis=0) / max(float(mass.sum()), 1e-12)
     alone = float((share * (1.0 - share)).sum())
     each = (above - share * mass[:, None]) / max(float(mass.mean()), 1e-12)

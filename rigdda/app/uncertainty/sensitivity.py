@@ -411,12 +411,12 @@ def plan(
     seeds = seeds_of(site, releases, seed)
     sites = tuple(site_at(site, inputs, row) for row in cube)
     groups: dict[tuple[bytes, Layout], tuple[Site, list[int]]] = {}
-    for i, own in enumerate(sites):
-        groups.setdefault((release_key(own), own.standing(layout)), (own, []))[1].append(i)
-    for own, _ in groups.values():
-        own.built(layout, 1.0)  # larger blocks may take the room of a barrier
-    found = tuple((own, tuple(rows)) for own, rows in groups.values())
-    return SensitivityPlan(site, layout, tuple(inputs), method, cube, seeds, sites, found, seed)
+    for i, varied in enumerate(sites):
+        groups.setdefault((release_key(varied), varied.standing(layout)), (varied, []))[1].append(i)
+    for varied, _ in groups.values():
+        varied.built(layout, 1.0)  # larger blocks may take the room of a barrier
+    simulated = tuple((varied, tuple(rows)) for varied, rows in groups.values())
+    return SensitivityPlan(site, layout, tuple(inputs), method, cube, seeds, sites, simulated, seed)
 
 
 def seeds_of(site: Site, releases: int, seed: int) -> Seeds:

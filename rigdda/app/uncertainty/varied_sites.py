@@ -132,14 +132,14 @@ class Priced(NamedTuple):
         return float(self.annual + self.terms.sum())
 
 
-def price(site: Site, layout: Layout, found: SimulatedSite) -> Priced:
+def price(site: Site, layout: Layout, simulated: SimulatedSite) -> Priced:
     """Return the costs of a layout with the prices, consequences and rates of a site."""
-    own = account(site, layout, found.outcomes)
-    terms = own.harm + own.repair
+    costs = account(site, layout, simulated.outcomes)
+    terms = costs.harm + costs.repair
     for i, name in enumerate(site.event_names):
-        here = found.strata == i
+        here = simulated.strata == i
         terms[here] *= site.rate(name, layout) / max(int(here.sum()), 1)
-    return Priced(site.annual(layout), terms, own.reached, own.failed)
+    return Priced(site.annual(layout), terms, costs.reached, costs.failed)
 
 
 def noise(terms: Floats, strata: NDArray[np.int64]) -> Floats:

@@ -135,7 +135,7 @@ FEATURES = sum(FIELDS[name].size for name in NAMES)
 
 
 def features(seen: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
-    """Return the (WIDTH,) features of one observation of `BarrierDesign`."""
+    """Return the (FEATURES,) features of one observation of `BarrierDesign`."""
     return np.concatenate([seen[name] for name in NAMES]).astype(np.float32)
 
 

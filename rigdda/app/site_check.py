@@ -1,4 +1,4 @@
-"""What will be computed on a site, in words and as a picture, and what about it looks odd."""
+"""Check of a site: what will be computed, as text and as a picture, and which values look odd."""
 
 from __future__ import annotations
 
@@ -462,7 +462,7 @@ def oddities(
         *_odd_design(site),
         *(
             f"motion.duration = {site.motion.duration:g} s: rock of {trial.event!r} still moves "
-            "above the road as releases end; give more"
+            "above the road as releases end; use a longer duration"
             for trial in trials
             if trial.cut_off
         ),

@@ -13,7 +13,7 @@ from rigdda.fields import about, documented
 class Removal(Barrier, frozen=True, tag="removal"):
     """Removal of an existing barrier of the site, see `[[existing]]`.
 
-    It is not part of a scene: the barrier is missing instead.
+    A removal adds no body to a scene. The scene is built without the barrier that it removes.
 
     Raises
     ------

@@ -49,13 +49,13 @@ class Envelope:
 
     Parameters
     ----------
-    often : (2, STATIONS) array
+    often : (2, ZONE_STATIONS) array
         Rate at which releases pass each station [1/year per 100 m], for each of `EVENT_CLASSES`.
-    energy : (2, STATIONS) array
+    energy : (2, ZONE_STATIONS) array
         95 % quantile of the kinetic energy of the blocks that pass a station [J]; 0 if none does.
-    bounce : (2, STATIONS) array
+    bounce : (2, ZONE_STATIONS) array
         95 % quantile of the height of their centroids above the ground [m].
-    deposit : (BINS + 2,) array
+    deposit : (DEPOSIT_BINS + 2,) array
         Share of the rock released per year that comes to rest uphill of the zone, in each bin from
         the start of the zone to the downhill edge of the road, and beyond; adds up to 1.
     """
@@ -70,7 +70,7 @@ class Transit(NamedTuple):
     """Passages and deposit of one release.
 
     `energy` [J] and `bounce` [m] hold one array per station, with one entry per block at its first
-    passage; `deposit` is (BINS + 2,) [m2].
+    passage; `deposit` is (DEPOSIT_BINS + 2,) [m2].
     """
 
     energy: list[Floats]
@@ -109,7 +109,7 @@ memory: Memory[bytes, Envelope] = Memory(8192)
 
 
 def stations(site: Site) -> Floats:
-    """Return the chainages of the stations, (STATIONS,) [m]."""
+    """Return the chainages of the stations, (ZONE_STATIONS,) [m]."""
     return np.linspace(site.barrier_zone.start, site.barrier_zone.end, ZONE_STATIONS)
 
 
@@ -225,7 +225,7 @@ def _quantile(parts: Sequence[Floats], weights: Sequence[float]) -> float:
 
 
 def _deposit(site: Site, run: Run) -> Floats:
-    """Return the final block area in each bin, (BINS + 2,) [m2]; see `Envelope`."""
+    """Return the final block area in each bin, (DEPOSIT_BINS + 2,) [m2]; see `Envelope`."""
     edges = np.linspace(site.barrier_zone.start, site.road.end, DEPOSIT_BINS + 1)
     part = np.searchsorted(edges, run.poses[-1, :, 0])
     area = [polygon_properties(block.vertices)[0] for block in run.scene.blocks]

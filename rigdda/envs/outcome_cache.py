@@ -131,7 +131,7 @@ class Sample(tuple[Outcome, ...]):
     def __new__(
         cls, outcomes: Iterable[Outcome] = (), ran: Sequence[bool] = (), seconds: float = 0.0
     ) -> Sample:
-        """Create a sample; without `ran` none counts as simulated."""
+        """Create a sample. By default, no outcome counts as newly simulated."""
         made = super().__new__(cls, outcomes)
         made.ran = tuple(ran) if ran else (False,) * len(made)
         made.seconds = seconds

@@ -70,7 +70,7 @@ def write_shapes(
 
     Parameters
     ----------
-    numbers : (N, DRAWN + most_corners) array
+    numbers : (N, RANDOM_NUMBERS + most_corners) array
         Random numbers of each block, in [0, 1).
     law : ShapeLaw
         Distribution of the outlines.

@@ -163,7 +163,7 @@ def test_a_cap_and_a_missed_target_are_told(toml: Path, tmp_path: Path) -> None:
     assert Site.load(toml).capital(layout) <= 500.0
     assert all(float(row["cost"]) <= 500.0 for row in rows(tmp_path / "o/evaluations.csv"))
     assert (
-        "a target is missed; the table shows the cheapest layout to build for each level" in words
+        "a target is missed; the table shows, for each upper bound of P(reach), the layout" in words
     )
     assert "frontier.csv, frontier.png are in o" in words
     assert png_size(tmp_path / "o/frontier.png")[0] > 900

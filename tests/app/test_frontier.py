@@ -143,10 +143,10 @@ def check_advice(words: str, other: Evaluation, chosen: Evaluation) -> None:
     if words == ": use a larger --budget":
         assert other.targets in (None, "met", "undecided")
         assert chosen.targets != "met" or other.targets == "met"
-    elif words == ", and misses the targets, too":
+    elif words == ", but also misses the targets":
         assert (other.targets, chosen.targets) == ("missed", "missed")
     else:
-        states = f"{other.targets}, and those of the latter {chosen.targets}"
+        states = f"{other.targets}, whereas those of the latter are {chosen.targets}"
         assert words == f", but its targets are {states}"
         assert findings.TARGET_RANK[other.targets] > findings.TARGET_RANK[chosen.targets]
 
@@ -325,9 +325,9 @@ def test_a_missed_target_returns_a_verified_frontier(
     lines = findings.frontier(done, done.frontier, len(known), done.replaced)
     assert f"among {len(known):,} layouts" in lines[0]
     count = len(verified)
-    assert ("all of them are verified" in lines[0]) == (count == len(done.frontier))
+    assert ("all of these layouts were verified" in lines[1]) == (count == len(done.frontier))
     least = min(done.frontier, key=lambda one: one.level)
-    assert f"is {at_most(least.level)}, for {euros(least.cost)} EUR" in lines[1]
+    assert f"is {at_most(least.level)}, for {euros(least.cost)} EUR" in lines[2]
     design_report.write_frontier(tmp_path, problem, done.frontier)
     written = rows(tmp_path / "frontier.csv")
     assert [float(row["cost"]) for row in written] == [one.cost for one in done.frontier]

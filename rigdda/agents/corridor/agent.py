@@ -91,7 +91,7 @@ def offer(problem: DesignProblem) -> Offer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prospect:
-    """Gain that money for construction brings on average, if it is spent where it gains most.
+    """Average gain of money for construction that is spent where it gains most.
 
     Parameters
     ----------

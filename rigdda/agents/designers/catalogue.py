@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 ENSEMBLE_RELEASES = 60
 """Number of releases of an event in an ensemble; three of them exceed the 95 % quantile."""
 ENSEMBLE_DIVISOR = 16
-"""The ensemble uses at most this fraction (1 / SHARE) of a budget."""
+"""The ensemble uses at most this fraction (1 / ENSEMBLE_DIVISOR) of a budget."""
 
 CROSSING = np.dtype(
     [

@@ -59,7 +59,7 @@ class Effect:
         Length of barrier to repair in each release [m].
     share : (E,) array
         Remaining share of the risk of each event with this barrier alone [-].
-    numbers : (E, BARRIER) array
+    numbers : (E, BARRIER_FEATURES) array
         Features of the barrier for each event.
     """
 
@@ -150,7 +150,7 @@ class Forecast:
     def _numbers(
         self, barrier: Barrier, table: NDArray[np.void], stopped: Any, failed: Bools
     ) -> Floats:
-        """Return the features of a barrier for each event, (E, BARRIER)."""
+        """Return the features of a barrier for each event, (E, BARRIER_FEATURES)."""
         site, zone, ground = self.problem.site, self.problem.zone, self.problem.site.profile
         tall = max(_tall(barrier), 0.1)
         capacity = 1e3 * (barrier.energy_class or 100.0) if isinstance(barrier, Fence) else 1e6
@@ -232,7 +232,7 @@ class Forecast:
         return max(over)
 
     def features(self, layout: Layout) -> Floats:
-        """Return the features of a layout for each event, (E, WIDTH)."""
+        """Return the features of a layout for each event, (E, LAYOUT_FEATURES)."""
         order = sorted(layout, key=lambda b: float(self.effect(b).share.mean()))
         events = len(self._risk)
         repair = np.zeros(events)
@@ -314,7 +314,7 @@ class Value:
         self.network = network
 
     def __call__(self, features: Floats) -> Floats:
-        """Return the predicted share for (..., WIDTH) features, from 0 to 1.2."""
+        """Return the predicted share for (..., LAYOUT_FEATURES) features, from 0 to 1.2."""
         return np.clip(self.network(features.astype(np.float32)).mean(axis=-1), 0.0, 1.2)
 
 

@@ -53,7 +53,7 @@ def train(model: str, sites: int | None, episodes: int | None, seed: int, out: P
     barriers. It is trained on simulated layouts of every site, about half a minute each. Writes
     value.safetensors. The one that ships with the package is the prior of the designer `race`.
 
-    The agent for corridors needs to know how much money will save in the remaining sections. This
+    The agent for corridors needs an estimate of what a budget saves in the remaining sections. It
     is computed from forecasts of the value network on every site, about half a minute each. Writes
     prospect.safetensors.
 

@@ -243,10 +243,11 @@ def _costs_less(name: str, other: Evaluation, best: tuple[str, Evaluation]) -> s
     line = f"the layout {name!r} costs less per year than {words!r}"
     if TARGET_RANK[other.targets] > TARGET_RANK[chosen.targets]:
         return (
-            f"{line}, but its targets are {other.targets}, and those of the latter {chosen.targets}"
+            f"{line}, but its targets are {other.targets}, whereas those of the latter are "
+            f"{chosen.targets}"
         )
     if TARGET_RANK[other.targets] == TARGET_RANK[MISSED]:
-        return f"{line}, and misses the targets, too"
+        return f"{line}, but also misses the targets"
     return f"{line}: use a larger --budget"
 
 
@@ -288,7 +289,7 @@ def no_layout_pays(site: Site, cases: Sequence[tuple[str, Evaluation]]) -> str:
 
 
 def over_the_cap(problem: DesignProblem, cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
-    """Return lines on the verified layouts that cost more to build than is allowed."""
+    """Return lines on the verified layouts that are more expensive to build than allowed."""
     most = problem.max_cost
     if most is None:
         return []
@@ -319,22 +320,26 @@ def frontier(
     if not front:
         return []
     known = sum(one.verified is not None for one in front)
-    words = "all of them are verified"
+    words = "all of these layouts were verified"
     if known < len(front):
-        verb = "is" if known == 1 else "are"
-        words = f"{known} of its {len(front)} layouts {verb} verified; the others have few releases"
+        verb = "was" if known == 1 else "were"
+        words = (
+            f"{known} of these {len(front)} layouts {verb} verified; the estimates of the others "
+            "are from the few releases of the search"
+        )
     least = min(front, key=lambda one: one.level)
     lines = [
-        f"{_what_missed(done, replaced)}; the table shows the cheapest layout to build for each "
-        f"level of P(reach) among {tried:,} layouts, compared by the upper bound: {words}",
+        f"{_what_missed(done, replaced)}; the table shows, for each upper bound of P(reach), the "
+        f"layout that is cheapest to build among {tried:,} layouts",
+        words,
         f"the lowest upper bound of P(reach) is {at_most(least.level)}, for {euros(least.cost)} "
         "EUR per metre to build",
     ]
     if replaced:
         lines.append(
-            f"the layout of the search misses the targets by more, or costs more per year; "
-            f"{done.chosen.name!r} was chosen among the verified layouts and verified again on "
-            "other releases"
+            f"{done.chosen.name!r} was chosen instead of the layout of the search, because it "
+            "misses the targets by less or has a lower annual cost; it was verified again on other "
+            "releases"
         )
     return lines
 
@@ -381,12 +386,12 @@ def of_design(done: DesignStudy) -> list[str]:
 
 
 def compliance(done: DesignStudy) -> str:
-    """Return a line on what it costs that all checks must be met; empty if they need not be."""
+    """Return a line on the cost of meeting all checks; empty if they are not required."""
     if done.problem.checks != "required":
         return ""
     other, chosen = done.unchecked, done.chosen.evaluation
     if other is None:
-        return "checks are required, which costs nothing: no better layout was found without them"
+        return "requiring the checks costs nothing: no better layout was found without them"
     free = other.evaluation
     failed = failed_checks(done.other_checks[other.name])
     faults = [f"fails its checks ({failed_words(failed)})"] if failed else []

@@ -452,7 +452,7 @@ SPREADS = {
 
 
 def site_blocks(site: Site) -> Iterator[Block]:
-    """Yield what the site is: its description, a section, and sentences on what was computed."""
+    """Yield the description of the site, a section, and sentences on what was computed."""
     yield Paragraph(site.description)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "site.png"
@@ -689,7 +689,7 @@ def _show(exhibit: Exhibit, folder: ResultsFolder, mark: str) -> Iterator[Block]
 
 
 def summary_section(folders: Folders) -> Iterator[Block]:
-    """Yield the answer first: what to build and what it is worth, or what comes down."""
+    """Yield the main result: what to build and what that saves, or which rock comes down."""
     designs = [folder for folder in folders if folder.files("layouts.csv", "design")]
     for folder in designs:
         yield from _titled([*_design_blocks(folder)], f"Design in {folder.label}", len(designs) > 1)
@@ -713,7 +713,7 @@ def _findings(folder: ResultsFolder, many: bool) -> Iterator[str]:
 
 
 def _design_blocks(folder: ResultsFolder) -> Iterator[Block]:
-    """Yield what to build, where, and what it costs and is worth."""
+    """Yield what to build, where, what it costs and what it saves."""
     _, rows = folder.table("layouts.csv", ("chosen", "objective_low", "objective_high"))
     chosen = next((row for row in rows if row["chosen"] == "True"), None)
     if chosen is None:

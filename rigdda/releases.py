@@ -467,7 +467,7 @@ def release(
 def _doubt_duration(site: Site) -> None:
     warnings.warn(
         f"motion.duration = {site.motion.duration:g} of site {site.name!r}: rock above the road "
-        "still moves as releases end, and counts as if it stopped there: give more",
+        "still moves as releases end, and counts as if it stopped there: use a longer duration",
         DoubtfulInput,
         stacklevel=3,
     )

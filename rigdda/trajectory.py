@@ -33,7 +33,7 @@ from rigdda.model.outcome import Outcome
 from rigdda.model.settings import EARTH
 from rigdda.model.site import Site
 from rigdda.model.site_tables import Drawn
-from rigdda.releases import TOGETHER, Batch, as_site, by_size, check_duration
+from rigdda.releases import MOST_PER_THREAD, Batch, as_site, by_size, check_duration
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -522,7 +522,7 @@ def trajectories(
     """
     asked = _asked(site, layout, event, seeds, tolerance, threads)
     count = len(asked.seeds)
-    size = max(1, min(TOGETHER, count // (4 * asked.threads)))
+    size = max(1, min(MOST_PER_THREAD, count // (4 * asked.threads)))
     parts = [asked.seeds[i : i + size] for i in range(0, count, size)]
     found = Trajectories.join(list(_computed(asked, parts)))
     check_duration([asked.site] * count, found.outcomes)

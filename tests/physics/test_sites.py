@@ -222,6 +222,6 @@ def test_a_release_that_is_cut_off_is_told() -> None:
     short = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, duration=1.0))
     with pytest.warns(DoubtfulInput, match=r"motion.duration = 1 of site 'verge'.*give more"):
         release_many([(short, (), seed, event) for seed in range(4)])
-    with pytest.warns(DoubtfulInput, match="give more"):
+    with pytest.warns(DoubtfulInput, match="longer duration"):
         release(short, (), 0, event)
     assert not any(o.cut_off for o in release_many([(site, (), s, event) for s in range(4)]))

@@ -44,7 +44,7 @@ SMOOTHING = 0.1
 rolls over a step of a tenth of its size. Features consist of segments shorter than the block; a
 bend between two longer segments always counts."""
 
-ROUNDING = 1e-9
+HEIGHT_ROUNDING = 1e-9
 """Height above a line below which a corner counts as being on it [m]."""
 
 
@@ -179,7 +179,7 @@ def smoothed(ground: Terrain, size: float) -> tuple[Floats, tuple[str, ...]]:
             x = shapely.get_coordinates(left)[:, 0]
             kept[low : high + 1] = np.isin(points[low : high + 1, 0], x)
     level = np.interp(points[:, 0], *points[kept].T)
-    level = np.where(np.abs(level - points[:, 1]) <= ROUNDING, points[:, 1], level)
+    level = np.where(np.abs(level - points[:, 1]) <= HEIGHT_ROUNDING, points[:, 1], level)
     kept[1:-1] |= names[1:] != names[:-1]
     return np.column_stack([points[:, 0], level])[kept], tuple(names[kept[:-1]].tolist())
 

@@ -198,7 +198,7 @@ def finding(words: str) -> None:
         click.echo(_found(words))
 
 
-FOUND = "rigdda.findings"
+FINDINGS_KEY = "rigdda.findings"
 """Key of the findings of a command in the data of its click context."""
 
 
@@ -207,7 +207,7 @@ def _found(words: str) -> str:
     line = " ".join(words.split())
     context = click.get_current_context(silent=True)
     if context is not None:
-        context.meta.setdefault(FOUND, []).append(line)
+        context.meta.setdefault(FINDINGS_KEY, []).append(line)
     return line
 
 
@@ -332,7 +332,7 @@ def _earlier(known: dict[str, RunRecord], command: str) -> list[str]:
 
 def _add_findings(record: RunRecord, folder: Path, context: click.Context) -> None:
     """Add the findings that a command printed to its record."""
-    record.findings = context.meta.get(FOUND, [])
+    record.findings = context.meta.get(FINDINGS_KEY, [])
     if record.findings:
         with suppress(OSError):  # the results are complete without them
             record.write(folder)

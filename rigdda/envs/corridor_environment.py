@@ -48,7 +48,7 @@ from rigdda.model.corridor import names as corridor_names
 DEFAULT_SECTIONS = 12
 """Default number of sections of an episode."""
 
-ROUNDING = 1e-9
+BUDGET_ROUNDING = 1e-9
 """Relative excess of a budget that is attributed to rounding [-]."""
 
 MOST_SECTIONS = 1_000
@@ -307,7 +307,7 @@ class CorridorDesign(LayoutEnv):
         for barrier in built:
             site = section.problem.site
             cost = section.length * site.capital(_downhill([*kept, barrier]))
-            if cost <= left + ROUNDING * self.budget:
+            if cost <= left + BUDGET_ROUNDING * self.budget:
                 kept.append(barrier)
             else:
                 more = cost - section.length * site.capital(_downhill(kept))

@@ -29,7 +29,7 @@ from rigdda.envs.intervals import CONFIDENCE, Mean
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-ROUNDING = 1e-12
+WEIGHT_ROUNDING = 1e-12
 """Error of sums of weights, relative to their total [-]."""
 
 TAIL = 0.5 * (1.0 - CONFIDENCE)
@@ -127,7 +127,9 @@ def quantiles(sample: BlockSample, levels: ArrayLike) -> list[Quantile]:
     share /= share[-1]
 
     def at(level: float) -> float:
-        return float(values[min(int(np.searchsorted(share, level - ROUNDING)), len(values) - 1)])
+        return float(
+            values[min(int(np.searchsorted(share, level - WEIGHT_ROUNDING)), len(values) - 1)]
+        )
 
     out = []
     for level in wanted:

@@ -48,7 +48,7 @@ from rigdda.model.traffic import TrafficConsequences
 
 Value = TypeVar("Value")
 
-ROUNDING = 1e-9
+ENCODING_ROUNDING = 1e-9
 """Tolerance for the overlap of barriers and loose rock [m]; encoded layouts lose their last
 digits."""
 
@@ -262,7 +262,10 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             if not isinstance(barrier, Built):
                 continue
             for low, high in taken:
-                if barrier.x < high - ROUNDING and barrier.x + barrier.extent > low + ROUNDING:
+                if (
+                    barrier.x < high - ENCODING_ROUNDING
+                    and barrier.x + barrier.extent > low + ENCODING_ROUNDING
+                ):
                     hint = f"put it outside the loose rock at x = {low:.2f} to {high:.2f}"
                     raise BadInput(f"barriers[{i}].x", barrier.x, hint)
             found.append(barrier.for_width(width))

@@ -18,6 +18,7 @@ from rigdda.model import loose_blocks
 from rigdda.model.settings import Settings
 from rigdda.model.site_tables import SiteTables
 from rigdda.model.source import ALLOWED_OVERLAP, Point, Source
+from rigdda.model.survey import GREATEST_HEIGHT, GREATEST_LENGTH
 
 LEAST_BEYOND = 30.0
 """Minimum length of the ground beyond the road [m], so that blocks that cross the road count as
@@ -25,9 +26,6 @@ beyond before they reach the end of the ground."""
 
 SAME_POINT = 1e-9
 """Distance below which two points of the ground are the same [m]."""
-
-HIGHEST, LONGEST = 5_000.0, 20_000.0
-"""Height and length of a slope [m] above which the unit is probably wrong (millimetres)."""
 
 MANY_STEPS, MANY_BLOCKS = 2e5, 3e3
 """Numbers of steps and blocks of a release that cause a warning. Releases of built-in sites take
@@ -134,8 +132,8 @@ def _check_slope(site: SiteTables) -> None:
         raise BadInput(f"slope.points[{outside[0]}]", points[outside[0]].tolist(), hint)
     _check_chain(points)
     tall, long = np.ptp(points[:, 1]), high - low
-    if tall > HIGHEST or long > LONGEST:
-        hint = f"give metres: at most {HIGHEST:g} m high and {LONGEST:g} m long"
+    if tall > GREATEST_HEIGHT or long > GREATEST_LENGTH:
+        hint = f"give metres: at most {GREATEST_HEIGHT:g} m high and {GREATEST_LENGTH:g} m long"
         raise BadInput("slope.points", f"{tall:g} m high and {long:g} m long", hint)
     check.number("road.start", road.start, low, high)
     check.number("slope.toe", site.slope.toe, low, road.start)

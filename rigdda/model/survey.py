@@ -78,7 +78,7 @@ LOCAL = 1000.0
 ROUND = 100.0
 """An offset is a whole multiple of this [m], so that it is easily added in the head."""
 
-LOWEST, SUMMIT = -450.0, 9_000.0
+LOWEST_GROUND, SUMMIT = -450.0, 9_000.0
 """Elevations [m] beyond which there is no ground on land."""
 
 SPIKE, OUTLIER = 3.0, 0.3
@@ -88,8 +88,9 @@ of them [-]."""
 DIGITS = 6
 """Decimals of the coordinates of a site in metres: subtraction leaves noise in later ones."""
 
-HIGHEST, LONGEST = 5_000.0, 20_000.0
-"""Height and length of a profile [m] above which it is not in metres."""
+GREATEST_HEIGHT, GREATEST_LENGTH = 5_000.0, 20_000.0
+"""Height and length of a profile or a slope [m] above which the unit is probably wrong, for example
+millimetres."""
 
 BACKWARD = 0.25
 """Share of the segments that may turn back: above it, rows are out of order."""
@@ -516,15 +517,15 @@ def _distinct(name: str, points: Floats, notes: list[str]) -> Floats:
 def _check_length(name: str, points: Floats) -> None:
     """Check that a profile is no longer than one in metres can be."""
     long, tall = np.ptp(points, axis=0).tolist()
-    if long > LONGEST:
-        hint = f"give metres: at most {LONGEST:g} m long and {HIGHEST:g} m high"
+    if long > GREATEST_LENGTH:
+        hint = f"give metres: at most {GREATEST_LENGTH:g} m long and {GREATEST_HEIGHT:g} m high"
         raise BadInput(name, f"{long:g} m long and {tall:g} m high", hint)
 
 
 def _check_elevations(name: str, points: Floats) -> None:
     """Check that all elevations are those of ground, and none stands for a missing one."""
     y = points[:, 1]
-    wrong = np.flatnonzero((y < LOWEST) | (y > SUMMIT))
+    wrong = np.flatnonzero((y < LOWEST_GROUND) | (y > SUMMIT))
     if wrong.size == 0:
         wrong = np.array(_zeros(points), dtype=np.intp)
     if wrong.size:
@@ -576,8 +577,8 @@ def _check_shape(name: str, points: Floats) -> None:
     """Check that points with growing chainage are a profile in metres."""
     x, y = points.T
     tall = float(np.ptp(y))
-    if tall > HIGHEST:
-        hint = f"give metres: at most {HIGHEST:g} m high"
+    if tall > GREATEST_HEIGHT:
+        hint = f"give metres: at most {GREATEST_HEIGHT:g} m high"
         raise BadInput(name, f"{tall:g} m high", hint)
     if tall == 0.0:
         raise BadInput(name, f"all points at elevation {y[0]:g}", "give a profile with a slope")

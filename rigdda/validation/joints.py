@@ -22,7 +22,7 @@ from rigdda.model.scene import Block, Scene, Surface, Terrain
 from rigdda.validation.case import Case, Check, Lab, Measured
 from rigdda.validation.scenes import FLAT, GRAVITY, Floats, box, masses, rock, shifts
 
-SLIDE_STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
+JOINT_SLIDE_STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
 SLIDE_TIME = 1.6
 """Duration of a slide [s]."""
 
@@ -79,7 +79,7 @@ def fall_along(friction_deg: float, clearance: float | None) -> Scene:
 def measure_slide(lab: Lab, slide: JointSlide) -> tuple[Measured]:
     """Simulate a slide over the row with all steps."""
     ways = []
-    for dt in SLIDE_STEPS:
+    for dt in JOINT_SLIDE_STEPS:
         scene, down = slide.scene()
         sim = lab.simulate(scene, dt)
         start = sim.poses
@@ -91,7 +91,7 @@ def measure_slide(lab: Lab, slide: JointSlide) -> tuple[Measured]:
 def measure_fall(lab: Lab, clearance: float | None) -> tuple[Measured]:
     """Simulate falls along a wall or in a slot with all steps, smooth and rough."""
     ways = []
-    for dt in SLIDE_STEPS:
+    for dt in JOINT_SLIDE_STEPS:
         for friction in (0.0, 30.0):
             sim = lab.simulate(fall_along(friction, clearance), dt)
             sim.step(round(1.2 / dt))

@@ -220,7 +220,7 @@ def test_a_release_that_is_cut_off_is_told() -> None:
     site = Site.load("verge")
     event = next(e.name for e in site.events if e.design)
     short = msgspec.structs.replace(site, motion=msgspec.structs.replace(site.motion, duration=1.0))
-    with pytest.warns(DoubtfulInput, match=r"motion.duration = 1 of site 'verge'.*give more"):
+    with pytest.warns(DoubtfulInput, match=r"motion.duration = 1 of site 'verge'.*longer duration"):
         release_many([(short, (), seed, event) for seed in range(4)])
     with pytest.warns(DoubtfulInput, match="longer duration"):
         release(short, (), 0, event)

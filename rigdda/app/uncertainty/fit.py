@@ -31,6 +31,7 @@ import rigdda
 from rigdda import MECHANICS, BadInput, Site, release_many
 from rigdda.app.reports.stations import QUANTITIES
 from rigdda.app.reports.tables import write_rows
+from rigdda.app.simulate import PARTS
 from rigdda.app.uncertainty.observations import (
     DEPOSIT,
     LEAST_VALUES,
@@ -40,7 +41,6 @@ from rigdda.app.uncertainty.observations import (
 )
 from rigdda.app.uncertainty.parameters import Parameter, Posterior, check_once, with_values
 from rigdda.app.uncertainty.score_surface import best_places
-from rigdda.app.uncertainty.varied_sites import PARTS
 from rigdda.envs.outcome_cache import fingerprint
 from rigdda.files import atomic
 from rigdda.lumped_mass import lumped

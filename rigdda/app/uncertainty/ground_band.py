@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from rigdda import Layout, Site
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.app.design_study import DesignStudy, design_events
+from rigdda.app.simulate import PARTS
 from rigdda.app.uncertainty.parameters import (
     Input,
     Posterior,
@@ -29,7 +30,7 @@ from rigdda.app.uncertainty.parameters import (
     ground,
     site_at,
 )
-from rigdda.app.uncertainty.varied_sites import PARTS, Priced, SimulatedSite, noise, price, simulate
+from rigdda.app.uncertainty.varied_sites import Priced, SimulatedSite, noise, price, simulate
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.cost import judge
 

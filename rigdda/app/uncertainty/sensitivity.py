@@ -46,6 +46,7 @@ from rigdda.app.uncertainty.varied_sites import (
     simulate,
 )
 from rigdda.envs import DesignProblem
+from rigdda.envs.intervals import CONFIDENCE
 from rigdda.envs.outcome_cache import release_key
 
 Floats = NDArray[np.float64]
@@ -66,9 +67,7 @@ MORRIS_LEVELS = 4
 RESAMPLES = 500
 """Number of bootstrap samples for the intervals."""
 
-CONFIDENCE = 0.95
-
-ROUNDING = 1e-12
+CHANGE_ROUNDING = 1e-12
 """Changes smaller than this share of the largest value count as 0 [-]."""
 
 DISTINCT = 2.24
@@ -200,7 +199,7 @@ def analyse(method: Method, cube: Floats, response: Response, seed: int) -> list
     pairs = [_pairs(method, cube, i) for i in range(dimensions)]
     changes = [_change(cube[:, i], response.values, *pair) for i, pair in enumerate(pairs)]
     noisy = [response.noise(*pair) for pair in pairs]
-    if np.ptp(response.values) <= ROUNDING * np.abs(response.values).max():
+    if np.ptp(response.values) <= CHANGE_ROUNDING * np.abs(response.values).max():
         return [AnalysedInput(*[0.0] * 10) for _ in pairs]
     signals = [
         _signal(cube[:, i], response, pair, own)
@@ -295,7 +294,7 @@ def _change(
     """Return the least-squares slope of the changes of an output over those of an input."""
     moved, changed = place[second] - place[first], values[second] - values[first]
     slope = float(moved @ changed / (moved @ moved))
-    return slope if abs(slope) > ROUNDING * float(np.abs(values).max()) else 0.0
+    return slope if abs(slope) > CHANGE_ROUNDING * float(np.abs(values).max()) else 0.0
 
 
 def of_function(

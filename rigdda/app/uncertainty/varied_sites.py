@@ -19,14 +19,12 @@ from numpy.typing import NDArray
 
 import rigdda
 from rigdda import MECHANICS, Layout, Outcome, Site
+from rigdda.app.simulate import PARTS
 from rigdda.envs import outcome_cache
 from rigdda.envs.cost import account
 from rigdda.files import atomic
 
 Floats = NDArray[np.float64]
-
-PARTS = "parts"
-"""Folder of the releases of an unfinished job. It is removed when the tables are written."""
 
 Seeds = Mapping[str, Sequence[int]]
 """Seeds of the releases of each event."""

@@ -27,7 +27,7 @@ CHART = {
 """Width and depth of a ditch [m] by inclination of the cut [deg], for cuts up to 10, 20 and 30 m
 high and for higher ones."""
 
-COLUMN_HEIGHTS = (10.0, 20.0, 30.0)
+CHART_COLUMNS = (10.0, 20.0, 30.0)
 """Heights up to which the columns of the chart apply [m]."""
 
 INCLINATIONS = (40.0, 90.0)
@@ -65,7 +65,7 @@ class RitchieDitch(NamedTuple):
         crest = above[above[:, 1] >= above[:, 1].max() - 0.1 * rise][-1]  # the crest of the cut
         steep = math.degrees(math.atan2(rise, max(toe - crest[0], 1e-3)))
         row = CHART[min(CHART, key=lambda angle: abs(angle - steep))]
-        width, depth = row[int(np.searchsorted(COLUMN_HEIGHTS, rise))]
+        width, depth = row[int(np.searchsorted(CHART_COLUMNS, rise))]
         return cls(float(rise), steep, width, depth)
 
     @property

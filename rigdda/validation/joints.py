@@ -126,7 +126,7 @@ SLIDES_OVER_JOINTS = (
 
 
 STRENGTH_STEPS = (1e-3, 5e-3, 1e-2)
-FRICTION = 30.0
+JOINT_FRICTION_DEG = 30.0
 """Friction angle of the joint [deg]."""
 
 STRENGTH = 1e5
@@ -159,7 +159,7 @@ def pulled(eccentricity: float, share: float) -> Scene:
     pull = share * STRENGTH / (1.0 + 6.0 * eccentricity)
     # pull and compensation of the weight, combined into one eccentric force
     load = PointLoad(0, (pull * eccentricity / (pull + weight), 1.0), (0.0, pull + weight))
-    surface = Surface(FRICTION, cohesion=100.0 * STRENGTH, tension=STRENGTH)
+    surface = Surface(JOINT_FRICTION_DEG, cohesion=100.0 * STRENGTH, tension=STRENGTH)
     return Scene(Terrain(FLAT), (block,), {"rock": surface}, loads=(load,))
 
 
@@ -167,8 +167,8 @@ def pushed(arm: float, share: float) -> Scene:
     """Return a block of 1 by 2 m on a joint, pushed by a fraction of the breaking force."""
     block = box(0.0, 1.0, 1.0, 2.0)
     weight = GRAVITY * float(masses(Scene(None, (block,)))[0][0])
-    push = share * (0.1 * STRENGTH + weight * math.tan(math.radians(FRICTION)))
-    surface = Surface(FRICTION, cohesion=0.1 * STRENGTH, tension=10.0 * STRENGTH)
+    push = share * (0.1 * STRENGTH + weight * math.tan(math.radians(JOINT_FRICTION_DEG)))
+    surface = Surface(JOINT_FRICTION_DEG, cohesion=0.1 * STRENGTH, tension=10.0 * STRENGTH)
     load = PointLoad(0, (0.0, arm), (push, 0.0))
     return Scene(Terrain(FLAT), (block,), {"rock": surface}, loads=(load,))
 

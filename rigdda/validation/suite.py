@@ -32,7 +32,7 @@ CASES: tuple[Case, ...] = (
     *motion.ENERGY_BALANCE,
     *assemblies.STACKS,
     *assemblies.SILOS,
-    *supports.CASES,
+    *supports.SUPPORT_CASES,
     *assemblies.ARCHES,
     *slopes.TOPPLING,
     *slopes.RITCHIE_CASES,

@@ -108,7 +108,7 @@ def measure_drop(lab: Lab) -> tuple[Measured, Measured]:
     return Measured(peaks, 2.0), Measured(changes)
 
 
-CASES = (
+SUPPORT_CASES = (
     Case(
         "pin-swing",
         (

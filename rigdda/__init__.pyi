@@ -34,7 +34,7 @@ from .model.settings import Settings
 from .model.site import Site
 from .model.site_tables import Drawn, Event
 from .model.source import Source
-from .model.traffic import Traffic
+from .model.traffic import Traffic, TrafficConsequences
 from .releases import release, release_many, release_outcome
 from .trajectory import Trajectories, trajectories, trajectory_parts
 
@@ -83,6 +83,7 @@ __all__ = [
     "Surface",
     "Terrain",
     "Traffic",
+    "TrafficConsequences",
     "Trajectories",
     "Wall",
     "grounds",

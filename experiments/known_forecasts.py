@@ -5,8 +5,9 @@ all candidate layouts on the first sites of each split. The catalogue is chosen 
 sites only. Sites whose forecasts are in the working folder are read, so that an interrupted run
 continues. Writes the file of `rigdda.envs.forecast_table`.
 
-Run it after every change of the mechanics or of the value network, and then
-`rigdda train --shipped`, which trains the policy that ships.
+Run it after every change of the mechanics or of the value network. Then train the policy that ships
+anew: `rigdda train --simulate 12 --out runs/policy`, and copy `policy.safetensors` from this folder
+to `rigdda/agents/designers`.
 """
 
 from __future__ import annotations
@@ -53,10 +54,9 @@ def main(train: int, validation: int, test: int, layouts: int, work: Path, out: 
     notes = {"command": f"{command} --test {test} --layouts {layouts}"}
     forecasts.table(names, found, catalogue, kept, notes).save(out)
     whole, own = (np.nanmin(z[:, some], axis=1).mean() for some in (slice(None), kept))
-    say(
-        f"{len(names)} sites, {out.stat().st_size / 1e3:.0f} kB; mean of the least forecast Z over Z"
-    )
-    say(f"without barriers on the training sites: {whole:.3f}, in the catalogue {own:.3f}")
+    say(f"{len(names)} sites, {out.stat().st_size / 1e3:.0f} kB")
+    say("mean of the least forecast Z over Z without barriers on the training sites:")
+    say(f"{whole:.3f} of all candidates, {own:.3f} of the catalogue")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""A trained policy, which maps the observation of a site without barriers to a layout.
+"""A trained policy, which chooses a layout from a catalogue of relative layouts without a search.
 
-The policy is a small neural network, evaluated with numpy and stored in a safetensors file. It
-designs a layout without a search.
+A small neural network scores each layout of the catalogue on a site from the features of its
+forecast (`rigdda.agents.learning.forecasts`), and the layout with the highest score is built. The
+network is evaluated with numpy and stored in a safetensors file together with the catalogue.
 """
 
 from __future__ import annotations
@@ -12,20 +13,24 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from msgspec.structs import replace
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from rigdda import BadInput, Layout
+from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble_for
+from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import Designer, DesignResult, Ledger, Progress
 from rigdda.agents.designers.store import Store
+from rigdda.agents.learning.forecasts import FEATURES, of_site
+from rigdda.agents.learning.relative_layouts import NOTHING
 from rigdda.envs import DesignProblem
-from rigdda.envs.observation import FIELDS, observe
-from rigdda.envs.site_sampling import KINDS, Slots
+from rigdda.envs.forecast_table import header_sorted
+from rigdda.envs.observation import FIELDS
 from rigdda.files import atomic
 
 Floats = NDArray[np.float32]
@@ -81,7 +86,7 @@ class Network:
             tensors |= {f"weight {i}": weight, f"bias {i}": bias}
         arrays = {k: np.ascontiguousarray(v, dtype=np.float32) for k, v in tensors.items()}
         with atomic(path) as part:
-            part.write_bytes(_in_order(save(arrays, dict(self.notes))))
+            part.write_bytes(header_sorted(save(arrays, dict(self.notes))))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Network:
@@ -119,12 +124,13 @@ def scaled(features: Floats, mean: Floats, scale: Floats) -> Floats:
     return np.clip((features - mean) / scale, np.float32(-3.0), np.float32(3.0))
 
 
-def _in_order(raw: bytes) -> bytes:
-    """Return a safetensors file with a sorted header, so that the bytes are reproducible."""
-    size = int.from_bytes(raw[:8], "little")
-    header = json.dumps(json.loads(raw[8 : 8 + size]), sort_keys=True).encode()
-    header += b" " * (-len(header) % 8)
-    return len(header).to_bytes(8, "little") + header + raw[8 + size :]
+def scaling(seen: Floats) -> tuple[Floats, Floats]:
+    """Return the mean and the standard deviation of (n, F) features.
+
+    The standard deviation of a feature that does not vary is replaced by 1.
+    """
+    scale = seen.std(axis=0)
+    return seen.mean(axis=0), np.where(scale > 1e-6, scale, 1.0).astype(np.float32)
 
 
 NAMES = tuple(FIELDS)
@@ -139,32 +145,53 @@ def features(seen: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
     return np.concatenate([seen[name] for name in NAMES]).astype(np.float32)
 
 
-SLOTS = Slots(KINDS, 3)
-"""Slots for the barriers that a policy decides on."""
-
 FINAL = 64
 """Largest number of releases on which the designer evaluates its layout."""
 
+SHIPPED = Path(__file__).parent / "designers" / "policy.safetensors"
+"""The policy that ships with the package, which the designer `policy` uses."""
 
-def _anchor() -> np.ndarray:
-    """Return numbers for one barrier near the lower end of the zone and two that are nearly built.
+LAYOUTS = "layouts"
+"""Key of the catalogue in the notes of the network of a policy."""
 
-    A barrier is built if its first number, the presence, is positive.
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Policy:
+    """A policy that scores the layouts of a catalogue.
+
+    Parameters
+    ----------
+    network : Network
+        Network from the features of a layout to its score; the mean of its outputs is the score.
+    layouts : tuple of A str
+        The relative layouts as JSON.
     """
-    numbers = np.zeros((SLOTS.count, SLOTS.width))
-    numbers[:, 0] = 0.4, -0.4, -0.4
-    numbers[:, 1] = 0.6, -0.2, 0.2
-    return numbers.ravel()
+
+    network: Network
+    layouts: tuple[str, ...]
+
+    def scores(self, features: NDArray[Any]) -> NDArray[np.float64]:
+        """Return the score of each layout from (..., A, F) features, (..., A)."""
+        found: NDArray[np.float64] = self.network(features.astype(np.float32)).mean(axis=-1)
+        return found
+
+    def choose(self, features: NDArray[Any], mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return the number of the best layout for (..., A, F) features and a (..., A) mask."""
+        best: NDArray[np.int64] = np.where(mask, self.scores(features), -np.inf).argmax(axis=-1)
+        return best
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the policy to a safetensors file."""
+        network = self.network
+        notes = dict(network.notes) | {LAYOUTS: json.dumps(self.layouts)}
+        Network(network.mean, network.scale, network.layers, notes).save(path)
 
 
-ANCHOR = _anchor()
-"""Decision to which the outputs of a network are added, (SLOTS.size,); trainings start from it."""
+def using(policy: Policy) -> Designer:
+    """Return a designer that builds the layout which a policy chooses.
 
-
-def using(network: Network) -> Designer:
-    """Return a designer that builds the layout which a network decides.
-
-    The designer needs at least 2 releases and evaluates the layout on up to 64 of its releases.
+    The designer needs at least 2 releases. At most a sixteenth of the budget is used for releases
+    without barriers, and up to 64 releases for the evaluation of the layout.
     """
 
     def design(
@@ -175,48 +202,54 @@ def using(network: Network) -> Designer:
         store: Store | None = None,
     ) -> DesignResult:
         ledger = Ledger(problem, simulations, seed, progress, store)
-        layout = decide(network, problem)
+        layout = decide(policy, problem, ensemble_for(ledger, Menu(problem).stations))
         return ledger.result(ledger.evaluate(layout, "report", min(FINAL, ledger.left)))
 
     return design
 
 
-def decide(network: Network, problem: DesignProblem) -> Layout:
-    """Return the layout of a network, within the slots and the kinds that a problem allows.
+def decide(
+    policy: Policy, problem: DesignProblem, crossings: CrossingEnsemble | None = None
+) -> Layout:
+    """Return the layout that a policy chooses for a problem.
+
+    Parameters
+    ----------
+    policy : Policy
+        The policy.
+    problem : DesignProblem
+        The problem. Layouts that it does not allow are left out.
+    crossings : CrossingEnsemble, optional
+        Releases without barriers; by default those of a table of forecasts are simulated.
 
     Raises
     ------
-    BadInput
-        If the problem allows no kind of barrier that policies build.
     Diverged
-        If a simulation for the observation diverges.
+        If a simulation without barriers diverges.
     """
-    kinds = [kind for kind in problem.kinds if kind in SLOTS.kinds]
-    if not kinds:
-        mend = "allow a kind that policies build: " + ", ".join(SLOTS.kinds)
-        raise BadInput("kinds", problem.kinds, mend)
-    site = replace(problem.site, barrier_zone=problem.zone)  # the observation covers this zone
-    slots = min(problem.max_barriers, SLOTS.count)
-    unlimited = DesignProblem(site, slots, kinds, max_cost=problem.max_cost)
-    seen = features(observe(unlimited))
-    numbers = np.clip(ANCHOR + network(seen), -1.0, 1.0)
-    return SLOTS.decode(unlimited, numbers[: unlimited.max_barriers * SLOTS.width])
+    found = of_site(problem, policy.layouts, crossings)
+    layout = found.layouts[int(policy.choose(found.features, np.isfinite(found.z)))]
+    assert layout is not None  # no barrier is always possible
+    return layout
 
 
 @lru_cache(maxsize=4)
-def load(path: str | os.PathLike[str]) -> Network:
-    """Return the network in a file; the file is read once.
+def load(path: str | os.PathLike[str] = SHIPPED) -> Policy:
+    """Return the policy in a file; the file is read once.
 
     Raises
     ------
     BadInput
-        If there is no such file, or if it does not contain a network from the features of an
-        observation to a layout.
+        If there is no such file, or if it does not contain a policy of this version.
     """
     network = Network.load(path)
-    sizes, wanted = network.sizes, (WIDTH, SLOTS.size)
-    if not sizes or (sizes[0], sizes[-1]) != wanted:
+    notes, sizes = dict(network.notes), network.sizes
+    try:
+        layouts = tuple(map(str, json.loads(notes.pop(LAYOUTS, "[]"))))
+    except (ValueError, TypeError):
+        layouts = ()
+    if not sizes or sizes[0] != FEATURES or NOTHING not in layouts:
         mend = "this is no policy of this version: name a file policy.safetensors that "
         mend += "`rigdda train` wrote"
         raise BadInput("policy", str(path), mend)
-    return network
+    return Policy(Network(network.mean, network.scale, network.layers, notes), layouts)

@@ -25,9 +25,8 @@ from rigdda.agents.designers.forecast import Forecast, forecast_seeds
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.race import joined
-from rigdda.agents.policy import Network
+from rigdda.agents.policy import Network, scaling
 from rigdda.agents.run_record import check_terms
-from rigdda.agents.training import scaling
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
 from rigdda.files import atomic

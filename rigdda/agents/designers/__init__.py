@@ -14,7 +14,10 @@ from rigdda import BadInput, check
 DEFAULT = "race"
 """Name of the default designer."""
 
-DESIGNERS = ("cma", "constant", "convex", "pareto", "ppo", "race", "random", "rule", "tpe", "value")
+DESIGNERS = (
+    "cma", "constant", "convex", "pareto", "policy", "ppo", "race", "random", "rule", "tpe", "value",
+)  # fmt: skip
+"""Names of the designers."""
 
 STOPPING = ("race",)
 """Designers whose `design` takes a `precision` and stops when the search gains less than that."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import MECHANICS, BadInput, Layout
-from rigdda.agents.designers.catalogue import ensemble
+from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble
 from rigdda.agents.designers.forecast import WIDTH as EVENT_WIDTH
 from rigdda.agents.designers.forecast import Forecast, forecast_seeds, value_network
 from rigdda.agents.designers.menu import Menu
@@ -31,8 +31,8 @@ Tick = Callable[[int, str], None]
 
 FEATURES = 3 + EVENT_WIDTH
 """Number of features of a layout: the annual cost of its barriers, the forecast remaining risk and
-the forecast Z, each over Z without barriers, and the mean over the events of the inputs of the value
-network. An event has the weight of its share of the risk without barriers. Features are limited to
+the forecast Z, each over Z without barriers, and the mean over the events of the inputs of the
+value network. An event has the weight of its share of the risk without barriers. Features are limited to
 `BOUND`."""
 
 SOFT = 0.05
@@ -95,8 +95,19 @@ class SiteForecasts:
         return found
 
 
-def of_site(problem: DesignProblem, catalogue: Sequence[str]) -> SiteForecasts:
+def of_site(
+    problem: DesignProblem, catalogue: Sequence[str], crossings: CrossingEnsemble | None = None
+) -> SiteForecasts:
     """Return the forecasts of the relative layouts of a catalogue on the site of a problem.
+
+    Parameters
+    ----------
+    problem : DesignProblem
+        The problem.
+    catalogue : sequence of A str
+        The relative layouts.
+    crossings : CrossingEnsemble, optional
+        Releases without barriers; by default those of `forecast_seeds` are simulated.
 
     Raises
     ------
@@ -104,7 +115,8 @@ def of_site(problem: DesignProblem, catalogue: Sequence[str]) -> SiteForecasts:
         If a simulation without barriers diverges.
     """
     site, menu = problem.site, Menu(problem)
-    crossings = ensemble(site, forecast_seeds(site), menu.stations)
+    if crossings is None:
+        crossings = ensemble(site, forecast_seeds(site), menu.stations)
     forecast = Forecast(problem, crossings, value_network())
     without = problem.nothing
     scale = max(without.objective, 1e-9)

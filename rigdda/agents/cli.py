@@ -996,31 +996,39 @@ def sensitivity(
     )
 
 
-TRAINING_SITES = {"policy": 512, "value": 96, "corridor": 12}
-"""Default number of training sites by model."""
-
-EPISODES = 49_152
-"""Default number of episodes of a policy."""
+TRAINING_SITES = {"policy": 0, "value": 96, "corridor": 12}
+"""Default number of training sites by model; 0: those of the table that ships."""
 
 
 @cli.command()
 @click.option("--model", type=click.Choice(tuple(TRAINING_SITES)),
               default="policy", show_default=True,
-              help="A policy trained with PPO, the value network, or the agent for "
-              "corridors.")  # fmt: skip
+              help="A policy, the value network, or the agent for corridors.")  # fmt: skip
 @click.option("--sites", type=WholeNumber(2), metavar="N",
-              help="Number of random sites to train on.  [default: 512 for a policy, 96 for the "
-              "value network, 12 for corridors]")  # fmt: skip
-@click.option("--episodes", type=WholeNumber(0, limits.RELEASES), metavar="N",
-              help="Number of episodes, for a policy.  [default: 49152]")  # fmt: skip
+              help="Number of random sites to train on.  [default: the table of forecasts of the "
+              "package for a policy, 96 for the value network, 12 for corridors]")  # fmt: skip
+@click.option("--algorithm", type=click.Choice(("gradient", "ppo")), default="gradient",
+              show_default=True,
+              help="Exact policy gradient or PPO, for a policy.")  # fmt: skip
+@click.option("--simulate", type=WholeNumber(0), default=0, show_default=True, metavar="K",
+              help="Number of promising layouts of each site to simulate for a second stage of "
+              "learning, for a policy.")  # fmt: skip
+@click.option("--compare", type=WholeNumber(0), default=6, show_default=True, metavar="N",
+              help="Number of validation sites for the comparison of the policy with simple "
+              "rules.")  # fmt: skip
+@count_option("--verify", 10, 200, "Number of new releases for each layout of the comparison.")
 @seed_option("Seed of all random numbers.", SEED)
 @out_option("train")
-def train(model: str, sites: int | None, episodes: int | None, seed: int, out: Path | None) -> None:
+def train(
+    model: str, sites: int | None, algorithm: str, simulate: int, compare: int, verify: int,
+    seed: int, out: Path | None,
+) -> None:  # fmt: skip
     """Train a network that designs layouts without a search.
 
-    A policy observes the ground, the prices and the rockfall without barriers, and is improved by
-    PPO. Writes policy.safetensors, for `rigdda evaluate --policy`, and logs for TensorBoard. A
-    complete training continues if --episodes is larger than before.
+    A policy chooses a layout from a catalogue of relative layouts. It learns on forecasts of the
+    value network, which takes seconds, and with --simulate also on outcomes. Then its layouts are
+    compared with no barrier, the constant, the rule and the best layout of the family of each site.
+    Writes policy.safetensors, for `rigdda evaluate --policy`, and comparison.csv.
 
     The value network forecasts the remaining risk with any layout from the rockfall without
     barriers. It is trained on simulated layouts of every site, about half a minute each. Writes
@@ -1035,10 +1043,11 @@ def train(model: str, sites: int | None, episodes: int | None, seed: int, out: P
     """
     from rigdda.agents import training, value_training
     from rigdda.agents.corridor import agent
+    from rigdda.agents.reports import training_table
 
     sites = sites or TRAINING_SITES[model]
-    if model != "policy" and episodes is not None:
-        raise click.UsageError("--episodes is for --model policy: leave it out")
+    if model != "policy" and (simulate or algorithm != "gradient"):
+        raise click.UsageError("--algorithm and --simulate are for --model policy: leave them out")
     if model == "corridor":
         folder = folder_for(out, "train", agent.FILE.name)
         with recorded_run(folder), progress(sites) as tick:
@@ -1056,15 +1065,15 @@ def train(model: str, sites: int | None, episodes: int | None, seed: int, out: P
             value_training.train(asked, folder, tick)
         click.echo(f"value network of {asked.sites} sites; value.safetensors is in {folder}")
         return
-    terms = training.Terms(sites, EPISODES if episodes is None else episodes, seed)
+    terms = training.Terms(sites, algorithm, simulate, seed)
     folder = folder_for(out, "train", *training.FILES)
-    with recorded_run(folder), progress(terms.episodes) as tick:
-        trained = training.train(terms, folder, lambda done: tick(done, "PPO"))
-    click.echo(
-        f"mean relative reduction of Z on {terms.beside} sites not used in training: "
-        f"{trained.before:.3f} before the training, {trained.after:.3f} after it; "
-        f"policy.safetensors is in {folder}"
-    )
+    with recorded_run(folder), progress(max(sites, compare, training.MEMBERS)) as tick:
+        policy = training.train(terms, folder, tick)
+        rows = training.compare(policy, folder, terms, compare, verify, tick)
+    if rows:
+        click.echo(training_table.HEAD)
+        show(training_table.table(rows))
+    click.echo(f"policy.safetensors is in {folder}")
 
 
 @cli.command()
@@ -1102,8 +1111,8 @@ def evaluate(
     evaluations.jsonl.
     """
     from rigdda.agents import contest, designers
+    from rigdda.agents.designers.policy import load, using
     from rigdda.agents.designers.store import Store
-    from rigdda.agents.policy import load, using
     from rigdda.agents.reports import tables
 
     tried = dict.fromkeys(("constant", "random", *names))

@@ -27,12 +27,14 @@ from rigdda.agents import limits
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.forecast import FILE as VALUE_NETWORK
 from rigdda.agents.designers.menu import Menu
+from rigdda.agents.designers.policy import Policy, decide
 from rigdda.agents.designers.protocol import verify
 from rigdda.agents.designers.rule import answer
 from rigdda.agents.designers.store import Store
 from rigdda.agents.learning import forecasts, outcomes
 from rigdda.agents.learning.relative_layouts import candidates, placed
-from rigdda.agents.policy import Network, Policy, decide, scaled, scaling
+from rigdda.agents.network import Network, scaled, scaling
+from rigdda.agents.reports import tables
 from rigdda.agents.run_record import check_terms
 from rigdda.envs import DesignProblem, forecast_table
 from rigdda.envs.envelope import largest
@@ -262,6 +264,37 @@ def methods(policy: Policy, table: ForecastTable, problem: DesignProblem) -> dic
 
 
 def compare(
+    policy: Policy, out: Path, terms: Terms, count: int, releases: int, tick: Tick
+) -> list[Compared]:
+    """Compare a policy with simple rules on validation sites and write `comparison.csv`.
+
+    Parameters
+    ----------
+    policy : Policy
+        The policy.
+    out : Path
+        The folder of its training.
+    terms : Terms
+        The terms of its training.
+    count : int
+        Number of the first validation sites that are tried.
+    releases : int
+        Number of fresh releases of each layout, the same for all methods.
+    tick : callable
+        Called with the number of completed sites and a description.
+
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
+    """
+    table, store = table_of(terms, out, tick), Store(out / "evaluations.jsonl")
+    rows = compared(policy, table, sites.split("validation")[:count], releases, store, tick)
+    tables.write_rows(out / "comparison.csv", [asdict(row) for row in rows])
+    return rows
+
+
+def compared(
     policy: Policy, table: ForecastTable, names: Sequence[str], releases: int, store: Store,
     tick: Tick,
 ) -> list[Compared]:  # fmt: skip

@@ -25,7 +25,7 @@ from rigdda.agents.designers.forecast import Forecast, forecast_seeds
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.race import joined
-from rigdda.agents.policy import Network, scaling
+from rigdda.agents.network import Network, scaling
 from rigdda.agents.run_record import check_terms
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest

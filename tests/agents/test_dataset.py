@@ -12,7 +12,7 @@ import pytest
 from rigdda import BadInput
 from rigdda.agents import cli, dataset
 from rigdda.agents.dataset import Recipe
-from rigdda.agents.policy import WIDTH
+from rigdda.agents.network import WIDTH
 from rigdda.barriers import from_table
 from rigdda.envs import DesignProblem
 

@@ -28,7 +28,7 @@ from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.forecast import Forecast, forecast_seeds, value_network
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.race import forecasts_of, single_barriers
-from rigdda.agents.policy import Network
+from rigdda.agents.network import Network
 from rigdda.envs import DesignProblem
 from rigdda.envs.corridor_environment import CorridorDesign
 

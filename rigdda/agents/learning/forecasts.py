@@ -46,8 +46,27 @@ SLOTS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SiteForecasts:
+class LayoutForecasts:
     """Forecasts of A relative layouts on one site.
+
+    Parameters
+    ----------
+    layouts : tuple of A (Layout or None)
+        The layouts on the site; None if they cannot be built.
+    features : (A, F) array
+        Features of each layout.
+    z : (A,) array
+        Forecast Z over Z without barriers [-]; NaN for layouts that cannot be built.
+    """
+
+    layouts: tuple[Layout | None, ...]
+    features: Floats
+    z: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SiteForecasts:
+    """The row of a site in a table, which a file stores.
 
     Parameters
     ----------
@@ -57,14 +76,11 @@ class SiteForecasts:
         Features of each layout.
     z : (A,) array
         Forecast Z over Z without barriers [-]; NaN for layouts that cannot be built.
-    layouts : tuple of (Layout or None)
-        The layouts on the site; None if they cannot be built.
     """
 
     observation: NDArray[np.float32]
     features: Floats
     z: Floats
-    layouts: tuple[Layout | None, ...] = ()
 
     def save(self, path: Path, catalogue: Sequence[str]) -> None:
         """Write the numbers to a file, with the catalogue that they belong to."""
@@ -97,7 +113,7 @@ class SiteForecasts:
 
 def of_site(
     problem: DesignProblem, catalogue: Sequence[str], crossings: CrossingEnsemble | None = None
-) -> SiteForecasts:
+) -> LayoutForecasts:
     """Return the forecasts of the relative layouts of a catalogue on the site of a problem.
 
     Parameters
@@ -132,8 +148,7 @@ def of_site(
         annual, risk = site.annual(layout) / scale, float(by_event @ left) / scale
         z[i] = annual + risk
         features[i] = annual, risk, z[i], *(weight @ inputs)
-    bounded = np.clip(features, -BOUND, BOUND)
-    return SiteForecasts(joined(observe(problem)), bounded, z, layouts)
+    return LayoutForecasts(layouts, np.clip(features, -BOUND, BOUND), z)
 
 
 def problem(name: str) -> DesignProblem:
@@ -160,7 +175,10 @@ def collect(
         tick(i, name)
         path = folder / f"{name}.npz"
         if not path.is_file():
-            of_site(problem(name), catalogue).save(path, catalogue)
+            posed = problem(name)
+            own = of_site(posed, catalogue)
+            row = SiteForecasts(joined(observe(posed)), own.features, own.z)
+            row.save(path, catalogue)
         found.append(SiteForecasts.load(path, catalogue))
     return found
 

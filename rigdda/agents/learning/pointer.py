@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from rigdda.agents.policy import Network
+from rigdda.agents.network import Network
 
 Floats = NDArray[np.float32]
 

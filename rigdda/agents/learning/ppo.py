@@ -15,7 +15,7 @@ import numpy as np
 import torch
 
 from rigdda.agents.learning.pointer import Pointer
-from rigdda.agents.policy import Network, scaled
+from rigdda.agents.network import Network, scaled
 from rigdda.envs.forecast_table import ForecastTable
 
 ITERATIONS, BATCH, EPOCHS, PARTS = 150, 512, 4, 4

@@ -15,7 +15,8 @@ DEFAULT = "race"
 """Name of the default designer."""
 
 DESIGNERS = (
-    "cma", "constant", "convex", "pareto", "policy", "ppo", "race", "random", "rule", "tpe", "value",
+    "cma", "constant", "convex", "pareto", "policy", "ppo", "race", "random", "rule", "tpe",
+    "value",
 )  # fmt: skip
 """Names of the designers."""
 

@@ -5,7 +5,8 @@ layout on every site. The expected reward of a policy pi is therefore a sum,
 
     J = mean over sites s of sum over layouts a of pi(a | s) r(s, a),
 
-of which the gradient needs no samples, no baseline and no critic. The whole algorithm is in `learn`.
+of which the gradient needs no samples, no baseline and no critic. The whole algorithm is in
+`learn`.
 """
 
 from __future__ import annotations

@@ -32,8 +32,8 @@ Tick = Callable[[int, str], None]
 FEATURES = 3 + EVENT_WIDTH
 """Number of features of a layout: the annual cost of its barriers, the forecast remaining risk and
 the forecast Z, each over Z without barriers, and the mean over the events of the inputs of the
-value network. An event has the weight of its share of the risk without barriers. Features are limited to
-`BOUND`."""
+value network. An event has the weight of its share of the risk without barriers. Features are
+limited to `BOUND`."""
 
 SOFT = 0.05
 """Scale of the soft minimum by which a catalogue is chosen [-], about the error of a forecast."""

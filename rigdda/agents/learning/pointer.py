@@ -7,6 +7,7 @@ way). Several members that were trained with different seeds are averaged.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -37,7 +38,7 @@ class Pointer(torch.nn.Module):
         generator = torch.Generator().manual_seed(seed)
         sizes = (width, HIDDEN, HIDDEN, 1)
         self.linear = torch.nn.ModuleList(
-            torch.nn.Linear(a, b) for a, b in zip(sizes[:-1], sizes[1:], strict=True)
+            torch.nn.Linear(a, b) for a, b in itertools.pairwise(sizes)
         )
         for layer in self.linear:
             bound = layer.in_features**-0.5

@@ -6,7 +6,7 @@ Finally its layouts on validation sites are simulated beside those of simple rul
 
 A training writes into one folder and continues from it: `training.json` (the terms), `sites/`
 (forecasts and outcomes of each site), `forecasts.safetensors` (the table), `evaluations.jsonl` (the
-releases of the comparison), `comparison.csv` and `policy.safetensors`.
+releases of the comparison) and `policy.safetensors`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,6 @@ from rigdda.agents.designers.store import Store
 from rigdda.agents.learning import forecasts, outcomes
 from rigdda.agents.learning.relative_layouts import candidates, placed
 from rigdda.agents.network import Network, scaled, scaling
-from rigdda.agents.reports import tables
 from rigdda.agents.run_record import check_terms
 from rigdda.envs import DesignProblem, forecast_table
 from rigdda.envs.envelope import largest
@@ -58,7 +57,7 @@ releases takes as long as hundreds of others."""
 FRESH = 2
 """Seed of the releases of the comparison, which no search and no training draws."""
 
-FILES = ("training.json", "policy.safetensors", "comparison.csv")
+FILES = ("training.json", "policy.safetensors")
 """Files that a training writes into its folder besides those of the sites."""
 
 
@@ -266,7 +265,7 @@ def methods(policy: Policy, table: ForecastTable, problem: DesignProblem) -> dic
 def compare(
     policy: Policy, out: Path, terms: Terms, count: int, releases: int, tick: Tick
 ) -> list[Compared]:
-    """Compare a policy with simple rules on validation sites and write `comparison.csv`.
+    """Compare a policy with simple rules on validation sites.
 
     Parameters
     ----------
@@ -289,9 +288,7 @@ def compare(
         If a simulation diverges.
     """
     table, store = table_of(terms, out, tick), Store(out / "evaluations.jsonl")
-    rows = compared(policy, table, sites.split("validation")[:count], releases, store, tick)
-    tables.write_rows(out / "comparison.csv", [asdict(row) for row in rows])
-    return rows
+    return compared(policy, table, sites.split("validation")[:count], releases, store, tick)
 
 
 def compared(

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_command_line import refused, rig, run
+from processes import refused, rig, run
+from rigdda.agents.policy import SLOTS, WIDTH, Network, decide
 
 from rigdda import sites
 from rigdda.agents import policy, training
 from rigdda.agents.designers import ppo
-from rigdda.agents.policy import SLOTS, WIDTH, Network, decide
 from rigdda.envs import DesignProblem
 
 SMALL = ("--sites", 2, "--episodes", 16)

@@ -34,7 +34,7 @@ def design(
 
     A policy for a single problem is a normal distribution in the decision box. This is therefore a
     search like that of the other designers. For a policy for many sites, see
-    `rigdda.agents.policy`.
+    `rigdda.agents.designers.policy`.
 
     Raises
     ------

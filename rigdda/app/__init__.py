@@ -1,0 +1,1 @@
+"""The application: the command line, what its commands compute, and their reports."""

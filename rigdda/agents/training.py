@@ -232,31 +232,35 @@ def family_of(name: str) -> str:
     return built_in(*instance(name))
 
 
-def best_of_families(table: ForecastTable) -> dict[str, int]:
-    """Return for each family the layout with the least mean forecast Z on its training sites.
+def best_of_families(table: ForecastTable) -> dict[str, list[int]]:
+    """Return for each family the catalogue in the order of mean forecast Z on its training sites.
 
     A layout that cannot be built on a site counts as no barrier there. Layouts are given by their
-    numbers in the catalogue.
+    numbers in the catalogue, the best first.
     """
     rows = table.rows("train")
     families = np.array([family_of(table.names[row]) for row in rows])
     reward = table.reward[rows]
-    return {name: int(reward[families == name].mean(axis=0).argmax()) for name in {*families}}
+    return {
+        name: np.argsort(-reward[families == name].mean(axis=0), kind="stable").tolist()
+        for name in dict.fromkeys(families.tolist())
+    }
 
 
 def methods(policy: Policy, table: ForecastTable, problem: DesignProblem) -> dict[str, Layout]:
     """Return the layouts of the policy and of the rules that it is compared with.
 
     The rules are no barrier, the constant, the engineering rule and the best layout of the family
-    (`best_of_families`), which is told the family of the site.
+    that can be built (`best_of_families`), which is told the family of the site.
     """
-    menu, best = Menu(problem), best_of_families(table)
-    family = best.get(family_of(problem.site.name), 0)
+    menu = Menu(problem)
+    order = best_of_families(table).get(family_of(problem.site.name), [0])
+    family = (placed(menu, table.layouts[i]) for i in order)
     found = {
         "nothing": (),
         "constant": constant(problem, menu),
         "rule": answer(problem).layout,
-        "best of the family": placed(menu, table.layouts[family]) or (),
+        "best of the family": next((layout for layout in family if layout is not None), ()),
         "policy": decide(policy, problem),
     }
     return {name: layout if problem.fits(layout) else () for name, layout in found.items()}

@@ -2,8 +2,8 @@
 
 `python -m experiments.throughput_forecast [--quick] [--out DIR]`. The loop steps a batch with
 random actions that the mask allows. The script is a policy gradient on a batch in the style of
-CleanRL, and Stable-Baselines3's PPO learns on `rigdda.envs.sb3_vec_env` with its default network. Times are
-processor time of one thread, which other jobs affect less than elapsed time. Writes
+CleanRL, and Stable-Baselines3's PPO learns on `rigdda.envs.sb3_vec_env` with its default network.
+Times are processor time of one thread, which other jobs affect less than elapsed time. Writes
 throughput_forecast.csv. Judged by the least number of steps per second of processor time.
 """
 

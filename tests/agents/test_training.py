@@ -65,9 +65,10 @@ def test_a_policy_learns_what_makes_a_layout_good(
     assert chosen_z(policy, table, "train") < 0.2 * first
     assert chosen_z(policy, table, "validation") < 0.5 * first  # sites that it has not seen
     read = load(tmp_path / "policy.safetensors")
-    assert read.layouts == LAYOUTS and read.network.notes["command"] == Terms(
-        algorithm=algorithm
-    ).command
+    assert (
+        read.layouts == LAYOUTS
+        and read.network.notes["command"] == Terms(algorithm=algorithm).command
+    )
     again = tmp_path / "again"
     again.mkdir()
     training.train(Terms(algorithm=algorithm), again, lambda *_: None)
@@ -150,9 +151,7 @@ def test_the_best_layout_of_a_family_is_chosen_on_its_training_sites(table: Fore
 def test_the_value_of_the_policy_is_shown_beside_simple_rules(tmp_path: Path) -> None:
     """A comparison on two light sites, by the command."""
     pytest.importorskip("torch")
-    words = run(
-        "train", "--compare", 2, "--verify", 20, "--out", tmp_path / "o", folder=tmp_path
-    )
+    words = run("train", "--compare", 2, "--verify", 20, "--out", tmp_path / "o", folder=tmp_path)
     assert "95 %" in words
     for method in ("nothing", "constant", "rule", "best of the family", "policy"):
         assert method in words

@@ -63,7 +63,7 @@ class Catalogue:
     """Spaces and content of the environment, common to the single environment and the batch."""
 
     def __init__(self, site: Place, table: Table, flat: bool, layout_features: bool):
-        self.table = table if isinstance(table, ForecastTable) else load(table)
+        self.table = table if isinstance(table, ForecastTable) else _from_file(table)
         self.rows = self.table.rows(site)
         self.flat = check.boolean("flat", flat)
         self.reward, self.mask = self.table.reward, self.table.mask
@@ -102,6 +102,11 @@ class Catalogue:
         if not isinstance(options, Mapping) or {*options} != {"site"}:
             raise BadInput("options", options, 'give {"site": ...} or None')
         return self.table.rows(options["site"])
+
+
+def _from_file(path: str | os.PathLike[str] | None) -> ForecastTable:
+    """Return the table in a file, or the one that ships."""
+    return load() if path is None else load(os.fspath(path))
 
 
 class BarrierForecast(gymnasium.Env[Any, Any]):
@@ -183,7 +188,7 @@ class BarrierForecast(gymnasium.Env[Any, Any]):
         if not self._open or self._row is None:
             raise ResetNeeded("the episode has ended: call reset() before the next step")
         if not self.action_space.contains(action):
-            mend = f"give a whole number from 0 to {self.action_space.n - 1}"
+            mend = f"give a whole number from 0 to {len(self.catalogue.table.layouts) - 1}"
             raise BadInput("action", action, mend)
         self._open = False
         reward = float(self.catalogue.reward[self._row, action])

@@ -158,7 +158,7 @@ def joined(seen: Mapping[str, NDArray[Any]]) -> Floats:
 
 
 @lru_cache(maxsize=4)
-def load(path: str | os.PathLike[str] | None = None) -> ForecastTable:
+def load(path: str | None = None) -> ForecastTable:
     """Return the table in a file, or the one that ships; each file is read once.
 
     Raises

@@ -7,7 +7,6 @@ way). Several members that were trained with different seeds are averaged.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -33,24 +32,30 @@ class Pointer(torch.nn.Module):
         Seed of the initial weights.
     """
 
+    first: torch.nn.Linear
+    second: torch.nn.Linear
+    last: torch.nn.Linear
+
     def __init__(self, width: int, seed: int):
         super().__init__()
         generator = torch.Generator().manual_seed(seed)
-        sizes = (width, HIDDEN, HIDDEN, 1)
-        self.linear = torch.nn.ModuleList(
-            torch.nn.Linear(a, b) for a, b in itertools.pairwise(sizes)
-        )
-        for layer in self.linear:
-            bound = layer.in_features**-0.5
+        self.first = torch.nn.Linear(width, HIDDEN)
+        self.second = torch.nn.Linear(HIDDEN, HIDDEN)
+        self.last = torch.nn.Linear(HIDDEN, 1)
+        for layer in self.layers:
+            bound = float(layer.in_features) ** -0.5
             torch.nn.init.uniform_(layer.weight, -bound, bound, generator=generator)
             torch.nn.init.zeros_(layer.bias)
 
+    @property
+    def layers(self) -> tuple[torch.nn.Linear, ...]:
+        """The linear layers."""
+        return self.first, self.second, self.last
+
     def forward(self, features: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
         """Return the logits; those of layouts that cannot be built are minus infinity."""
-        values = features
-        for layer in list(self.linear)[:-1]:
-            values = torch.tanh(layer(values))
-        scores = self.linear[-1](values)[..., 0]
+        values = torch.tanh(self.second(torch.tanh(self.first(features))))
+        scores: torch.Tensor = self.last(values)[..., 0]
         return scores.masked_fill(~mask, -torch.inf)
 
 
@@ -59,10 +64,9 @@ def export(
 ) -> Network:
     """Return one network of which the outputs are the scores of the members."""
     layers = []
-    for k in range(3):
-        own = [member.linear[k] for member in members]
-        weights = [layer.weight.detach().numpy().astype(np.float32) for layer in own]  # type: ignore[union-attr, operator]
-        bias = np.concatenate([layer.bias.detach().numpy() for layer in own])  # type: ignore[union-attr, operator]
+    for k, own in enumerate(zip(*(member.layers for member in members), strict=True)):
+        weights = [layer.weight.detach().numpy().astype(np.float32) for layer in own]
+        bias = np.concatenate([layer.bias.detach().numpy() for layer in own])
         layers.append((np.concatenate(weights) if k == 0 else _diagonal(weights), bias))
     return Network(mean, scale, layers, notes)
 

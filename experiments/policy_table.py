@@ -15,6 +15,7 @@ family, and, in the note, by the distance to the value network.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -103,7 +104,7 @@ def run(quick: bool, out: Path) -> Number:
     least = min(mean - half for mean, half in differences(rows, SIMPLE).values())
     what = "gain of the policy over constant, rule and family over Z without barriers, lower end"
     note = f"{len(relative(rows, 'policy'))} sites\n" + "\n".join(lines)
-    return Number(what, least, low=-1.0 if quick else 0.0, note=note)
+    return Number(what, least, low=-math.inf if quick else 0.0, note=note)
 
 
 if __name__ == "__main__":

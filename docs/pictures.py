@@ -61,6 +61,13 @@ def tutorial(path: Path) -> None:
     pictures.released(path, passing, (), summary(passing, range(len(lines))))
 
 
+def trajectories(path: Path) -> None:
+    """Draw what the page on trajectories draws."""
+    page = (DOCS / "howto/trajectories.md").read_text(encoding="utf-8")
+    code = "".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))
+    exec(code.replace('"trajectories.png"', "path"), {"path": path})
+
+
 def _write(path: Path, env: gymnasium.Env) -> None:
     with atomic(path) as part:
         imsave(part, env.render(), format="png")
@@ -72,6 +79,7 @@ def main() -> None:
     placement(DOCS / "environments/placement.png")
     corridor(DOCS / "environments/corridor.png")
     tutorial(DOCS / "tutorials/section.png")
+    trajectories(DOCS / "howto/trajectories.png")
 
 
 if __name__ == "__main__":

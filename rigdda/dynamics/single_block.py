@@ -22,6 +22,7 @@ from rigdda.dynamics.loop import Loop
 from rigdda.dynamics.packing import fences, pack, write_bodies
 from rigdda.dynamics.records import TARGET, Bodies, Interfaces
 from rigdda.dynamics.stems import write_stems
+from rigdda.dynamics.step_record import StepRecord
 from rigdda.dynamics.template import together
 from rigdda.errors import Diverged
 from rigdda.geometry import is_sound
@@ -270,6 +271,7 @@ class SingleBlock:
         limits: Sequence[float],
         stems: Stemmed,
         steps: int,
+        record: StepRecord | None = None,
     ) -> Descent | None:
         """Simulate the descent of a block.
 
@@ -287,6 +289,8 @@ class SingleBlock:
             Stems that the block strikes, see `Scene.stems`, for which `has_room`.
         steps : int
             Maximum number of steps.
+        record : StepRecord, optional
+            Filled with the states of the block.
 
         Returns
         -------
@@ -319,7 +323,10 @@ class SingleBlock:
         if not clear:
             return None
         try:
-            loop.advance(steps, self._no_frames)
+            if record is None:
+                loop.advance(steps, self._no_frames)
+            else:
+                record.follow(loop, steps)
         except Diverged:
             return None
         place, velocity, extent, energy = read_single_directly.call(a.bodies, a.monitors.rock)

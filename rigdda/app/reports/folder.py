@@ -13,8 +13,8 @@ from rigdda.app.reports import checks, findings, frontier_report, layout_tables,
 from rigdda.app.reports.pictures import (
     DRAWN,
     ENOUGH,
+    EventTrajectories,
     Panel,
-    Trajectories,
     envelopes,
     section,
     trajectories,
@@ -71,7 +71,7 @@ def _section(done: DesignStudy, path: Path, seed: int) -> None:
     section(path, site, done.problem.zone, panels, found, bare)
 
 
-def _all(site: Site, layout: Layout, seed: int) -> list[Trajectories]:
+def _all(site: Site, layout: Layout, seed: int) -> list[EventTrajectories]:
     """Simulate releases of every event of a site."""
     seeds = release_seeds("ensemble", seed, DRAWN)
     return [trajectories(site, layout, event.name, seeds) for event in site.events]

@@ -60,7 +60,7 @@ EVERY = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trajectories:
+class EventTrajectories:
     """Trajectories in releases of one event.
 
     Parameters
@@ -108,7 +108,7 @@ class PassageEnvelope:
         return cls(event, stations, lines("height_top"), lines("energy"))
 
 
-def trajectories(site: Site, layout: Layout, event: str, seeds: Sequence[int]) -> Trajectories:
+def trajectories(site: Site, layout: Layout, event: str, seeds: Sequence[int]) -> EventTrajectories:
     """Simulate releases of an event in threads on all cores, for their trajectories.
 
     The seeds are used in order until `DRAWN` blocks have been released.
@@ -125,7 +125,7 @@ def trajectories(site: Site, layout: Layout, event: str, seeds: Sequence[int]) -
     with ThreadPoolExecutor() as pool:
         runs = [first, *pool.map(lambda seed: _run(site, layout, event, seed), more)]
     ways = [run.poses[:, i, :2] for run in runs for i in range(run.poses.shape[1])]
-    return Trajectories(event, tuple(ways[:: max(1, len(ways) // DRAWN)]))
+    return EventTrajectories(event, tuple(ways[:: max(1, len(ways) // DRAWN)]))
 
 
 def _run(site: Site, layout: Layout, event: str, seed: int) -> Run:
@@ -338,7 +338,7 @@ class Panel:
 
     title: str
     layout: Layout
-    shown: Sequence[Trajectories]
+    shown: Sequence[EventTrajectories]
 
 
 def section(

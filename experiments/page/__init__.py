@@ -1,0 +1,1 @@
+"""Response times of the page in the browser."""

@@ -15,8 +15,9 @@ import click
 from experiments.made_by import MADE_BY, made_by
 from experiments.script import RESULTS
 from rigdda import MECHANICS
+from rigdda.agents.designers import policy
 from rigdda.app.exam import specification
-from rigdda.envs import site_store
+from rigdda.envs import forecast_table, site_store
 
 UNKNOWN = "made by unknown mechanics"
 
@@ -37,6 +38,12 @@ def stale_package() -> Iterator[tuple[str, str]]:
     if store is None or not store.current:
         made = UNKNOWN if store is None else store.mechanics
         yield "statistics of sites (experiments.known_sites)", made
+    made = forecast_table.load().notes.get("mechanics", UNKNOWN)
+    if made != MECHANICS:
+        yield "table of forecasts (experiments.known_forecasts)", made
+    made = policy.load().network.notes.get("mechanics", UNKNOWN)
+    if made != MECHANICS:
+        yield "policy (rigdda train, see experiments.known_forecasts)", made
 
 
 @click.command(help=__doc__)

@@ -43,7 +43,7 @@ SMALL = {
     "fit": ["--budget", "8", "--releases", "10"],
     "sensitivity": ["--samples", "2", "--releases", "10"],
     "simulate": ["--releases", "4"],
-    "train": ["--sites", "2", "--episodes", "4"],
+    "train": ["--compare", "1", "--verify", "20"],
     "validate": ["--only", "free flight"],
 }
 """Options that come last, and so count, in place of those of the page."""

@@ -14,6 +14,7 @@ if TYPE_CHECKING:  # `as` declares these names as exports of this package
     from rigdda.agents.designers import constant as constant
     from rigdda.agents.designers import convex as convex
     from rigdda.agents.designers import pareto as pareto
+    from rigdda.agents.designers import policy as policy
     from rigdda.agents.designers import ppo as ppo
     from rigdda.agents.designers import race as race
     from rigdda.agents.designers import random as random

@@ -93,8 +93,8 @@ def read(folder: Path) -> dict[str, RunRecord]:
     try:
         return msgspec.json.decode(file.read_bytes(), type=dict[str, RunRecord])
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        mend = f"remove this file, then repeat the command that wrote the folder ({error})"
-        raise BadInput("RESULTS", str(file), mend) from None
+        hint = f"remove this file, then repeat the command that wrote the folder ({error})"
+        raise BadInput("RESULTS", str(file), hint) from None
 
 
 def write_records(folder: Path, records: dict[str, RunRecord]) -> None:

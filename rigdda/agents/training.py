@@ -1,16 +1,20 @@
-"""Training of a policy with PPO on a pool of generated sites.
+"""Training of a policy: in the learned model first, then on simulated outcomes.
 
-A training writes its files into one folder and continues from them: `training.json` (the terms),
-`checkpoint.zip` (the trainer), `ppo_0/` (TensorBoard) and `policy.safetensors`.
+The policy learns on a table of forecasts (`rigdda.agents.learning.forecasts`), which takes seconds.
+Then it may learn on simulated outcomes of promising layouts (`rigdda.agents.learning.outcomes`).
+Finally its layouts on validation sites are simulated beside those of simple rules.
+
+A training writes into one folder and continues from it: `training.json` (the terms), `sites/`
+(forecasts and outcomes of each site), `forecasts.safetensors` (the table), `evaluations.jsonl` (the
+releases of the comparison) and `policy.safetensors`.
 """
 
 from __future__ import annotations
 
-import zipfile
-import zlib
-from collections.abc import Callable
-from contextlib import closing
+import hashlib
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,33 +22,43 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import MECHANICS, BadInput, __version__, check, sites
-from rigdda.agents import designers, limits
-from rigdda.agents.designers.protocol import release_seeds
-from rigdda.agents.policy import SLOTS, Network, decide, features
+from rigdda import MECHANICS, BadInput, Layout, __version__, check, sites
+from rigdda.agents import limits
+from rigdda.agents.designers.constant import constant
+from rigdda.agents.designers.forecast import NETWORK_FILE as VALUE_NETWORK
+from rigdda.agents.designers.menu import Menu
+from rigdda.agents.designers.policy import Policy, decide
+from rigdda.agents.designers.protocol import verify
+from rigdda.agents.designers.rule import answer
+from rigdda.agents.designers.store import Store
+from rigdda.agents.learning import forecasts, outcomes
+from rigdda.agents.learning.relative_layouts import candidates, placed
+from rigdda.agents.network import Network, scaled, scaling
 from rigdda.agents.run_record import check_terms
-from rigdda.envs import DesignProblem
-from rigdda.envs.envelope import barrier_free
-from rigdda.envs.observation import observe
-from rigdda.envs.site_sampling import problem_of
+from rigdda.envs import DesignProblem, forecast_table
+from rigdda.envs.envelope import largest
+from rigdda.envs.forecast_table import ForecastTable
 from rigdda.files import atomic
+from rigdda.model.site_names import built_in, instance
 
-Tick = Callable[[int], None]
+Floats = NDArray[np.float64]
+Tick = Callable[[int, str], None]
 
-COMPARISON_RELEASES = 64
-"""Number of releases of each site for comparing the trained policy with the initial one."""
+ALGORITHMS = ("gradient", "ppo")
+"""Algorithms for learning on forecasts, see `rigdda.agents.learning`."""
 
-FIDELITY = "fast"
-"""Fidelity of the releases for training."""
+MEMBERS = 3
+"""Number of networks with different seeds, of which the scores are averaged."""
 
-SPLIT = "train"
-"""Split with the sites for training and for the comparison."""
+MASS = 100
+"""Number of blocks of an event from which a site is left out of the comparison, since one of its
+releases takes as long as hundreds of others."""
 
-TRAINING_FILES = ("training.json", "checkpoint.zip", "policy.safetensors")
-"""Files that a training writes into its folder besides the logs."""
+FRESH = 2
+"""Seed of the releases of the comparison, which no search and no training draws."""
 
-ANEW = "this is damaged: remove the training in its folder, or name another folder with --out"
-"""Remedy for a training that cannot be continued."""
+FILES = ("training.json", "policy.safetensors")
+"""Files that a training writes into its folder besides those of the sites."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,152 +68,259 @@ class Terms:
     Parameters
     ----------
     sites : int
-        Number of training sites, at least 2.
-    episodes : int
-        Number of episodes of PPO.
+        Number of training sites for a new table of forecasts, at least 2; or 0 for the table that
+        ships with the package.
+    algorithm : str
+        One of `ALGORITHMS`.
+    simulate : int
+        Number of layouts of each training site to simulate; 0 for forecasts alone.
     seed : int
         Seed of all random numbers.
     """
 
-    sites: int
-    episodes: int
-    seed: int
+    sites: int = 0
+    algorithm: str = "gradient"
+    simulate: int = 0
+    seed: int = 0
 
     def __post_init__(self) -> None:
-        check.integer("sites", self.sites, 2, len(sites.split(SPLIT)) // 2)
-        check.integer("episodes", self.episodes, 0, limits.JOB_RELEASES)
+        if self.sites:
+            check.integer("sites", self.sites, 2, len(sites.split("train")))
+        check.one_of("algorithm", self.algorithm, ALGORITHMS)
+        check.integer("simulate", self.simulate, 0, forecasts.LAYOUTS)
         check.integer("seed", self.seed, 0, limits.SEED)
 
     @property
-    def beside(self) -> int:
-        """Number of further sites on which the policy is evaluated before and after training."""
-        return max(2, self.sites // 8)
+    def command(self) -> str:
+        """The command with these terms."""
+        made = f" --sites {self.sites}" if self.sites else ""
+        made += f" --algorithm {self.algorithm} --simulate {self.simulate} --seed {self.seed}"
+        return "rigdda train" + made
 
 
 @dataclass(frozen=True, slots=True)
-class Trained:
-    """A trained policy and the relative reduction of Z by its layouts before and after training.
+class Compared:
+    """Z of one layout on one site, from fresh releases.
 
-    The reductions are means over sites that were not used in the training.
+    Parameters
+    ----------
+    site, method : str
+        The site and the method that chose the layout.
+    z, nothing : float
+        Z with the layout and without barriers [EUR per metre of road and year].
     """
 
-    network: Network
-    before: float
-    after: float
+    site: str
+    method: str
+    z: float
+    nothing: float
 
 
-def train(terms: Terms, out: Path, tick: Tick) -> Trained:
-    """Train a policy, or continue a training that was interrupted or had fewer episodes.
+def train(terms: Terms, out: Path, tick: Tick) -> Policy:
+    """Train a policy, or continue an interrupted training; write it to `policy.safetensors`.
 
-    An interrupted training gives the same result as an uninterrupted one. The learning rate
-    decreases to zero over the requested episodes. Therefore a training that is extended later ends
-    with another policy than one that was started with all the episodes.
+    Forecasts and outcomes of completed sites are kept. Learning takes seconds and is repeated.
+    Repeating a training gives the same file on the same machine.
 
     Raises
     ------
     BadInput
-        If the folder contains a damaged training, a training on other terms or one with more
-        episodes, or if torch is not installed.
+        If the folder contains a training on other terms, or torch is not installed.
     Diverged
         If a simulation diverges.
     """
-    ppo = designers.module("ppo")
-    stages = _stages(terms, out)
-    names = sites.split(SPLIT)
-    pool = [problem(name) for name in names[: terms.sites]]
-    barrier_free([problem.site for problem in pool])
-    mean, scale = scaling(np.stack([observed_features(problem) for problem in pool]))
-    copies = ppo.Featured(ppo.pool(names[: terms.sites], FIDELITY), mean, scale)
-    with closing(copies):
-        model = ppo.learner(copies, terms.seed, out)
-        notes = _notes(terms, stages)
-        start = ppo.export(model, mean, scale, notes)
-        if (out / "checkpoint.zip").is_file():
-            model = ppo.resume(out / "checkpoint.zip", copies)
-        ppo.learn(model, terms.episodes, out / "checkpoint.zip", tick)
-    network = ppo.export(model, mean, scale, notes)
-    network.save(out / "policy.safetensors")
-    others = [problem(name) for name in names[terms.sites : terms.sites + terms.beside]]
-    return Trained(network, examine(start, others), examine(network, others))
+    table = table_of(terms, out, tick)
+    digest = hashlib.sha256(table.z.tobytes() + table.features.tobytes()).hexdigest()[:16]
+    network = hashlib.sha256(VALUE_NETWORK.read_bytes()).hexdigest()[:16]
+    notes = {
+        "command": terms.command, "version": __version__, "mechanics": MECHANICS,
+        "table": digest, "table command": table.notes.get("command", ""), "value network": network,
+    }  # fmt: skip
+    _agree(asdict(terms) | notes, out)
+    z = None
+    if terms.simulate:
+        folder = out / "sites"
+        folder.mkdir(exist_ok=True, parents=True)
+        z = outcomes.collect(table, terms.simulate, folder, tick)
+    policy = Policy(learn(terms, table, z, notes, tick), table.layouts)
+    policy.save(out / "policy.safetensors")
+    return policy
 
 
-def problem(name: str) -> DesignProblem:
-    """Return the problem of a training site."""
-    return problem_of(name, SLOTS.count, None, FIDELITY)
+def table_of(terms: Terms, out: Path, tick: Tick) -> ForecastTable:
+    """Return the table that ships, or make one of the requested number of training sites.
 
-
-def observed_features(problem: DesignProblem) -> NDArray[np.float32]:
-    """Return the features of a problem."""
-    return features(observe(problem))
-
-
-def scaling(
-    seen: NDArray[np.float32],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the mean and the standard deviation of (n, F) features.
-
-    The standard deviation of a feature that does not vary is replaced by 1.
+    Raises
+    ------
+    BadInput
+        If the table that ships is of another version of the mechanics.
     """
-    scale = seen.std(axis=0)
-    return seen.mean(axis=0), np.where(scale > 1e-6, scale, 1.0).astype(np.float32)
+    if not terms.sites:
+        table = forecast_table.load()
+        if table.notes["mechanics"] != MECHANICS:
+            hint = "the table that ships is of another version of the mechanics: give --sites N"
+            raise BadInput("table", table.notes["mechanics"], hint)
+        return table
+    folder, catalogue = out / "sites", candidates()
+    folder.mkdir(parents=True, exist_ok=True)
+    names = sites.split("train")[: terms.sites]
+    found = forecasts.collect(names, catalogue, folder, tick)
+    kept = forecasts.choose(np.array([own.z for own in found]), catalogue, forecasts.LAYOUTS)
+    notes = {"command": f"rigdda train --sites {terms.sites}"}
+    table = forecasts.table(names, found, catalogue, kept, notes)
+    table.save(out / "forecasts.safetensors")
+    return ForecastTable.load(out / "forecasts.safetensors")  # rounded as in the file
 
 
-def examine(network: Network, problems: list[DesignProblem]) -> float:
-    """Return the relative reduction of Z by the layouts of a policy, as a mean over problems."""
-    seeds = release_seeds("final", 0, COMPARISON_RELEASES)
-    built = [problem.evaluate(decide(network, problem), seeds) for problem in problems]
-    return float(np.mean([p.reward(e) for p, e in zip(problems, built, strict=True)]))
+def learn(
+    terms: Terms, table: ForecastTable, z: Floats | None, notes: dict[str, str], tick: Tick
+) -> Network:
+    """Return the network of a policy that learnt on forecasts and, if given, on outcomes.
 
-
-def _notes(terms: Terms, stages: list[int]) -> dict[str, str]:
-    """Return the notes in the file of a policy, with the command for each number of episodes."""
-    commands = [
-        f"rigdda train --sites {terms.sites} --episodes {episodes} --seed {terms.seed}"
-        for episodes in stages
-    ]
-    return {"command": "; ".join(commands), "version": __version__} | {
-        name: str(value) for name, value in asdict(terms).items()
-    }
-
-
-def _stages(terms: Terms, out: Path) -> list[int]:
-    """Return the successive numbers of episodes that were requested for a training.
-
-    The terms are written into the folder. If it contains a training already, check first that it
-    is undamaged and has the same terms.
+    Raises
+    ------
+    BadInput
+        If torch is not installed.
     """
+    try:
+        import torch
+
+        from rigdda.agents.learning import exact_gradient, pointer, ppo
+    except ModuleNotFoundError as error:
+        hint = f"install {error.name}: pip install 'rigdda[rl]'"
+        raise BadInput("model", "policy", hint) from None
+    rows = table.rows("train")
+    given, mask = table.features[rows], table.mask[rows]
+    bare = Network(*scaling(given[mask]), [], notes)
+    torch.set_num_threads(1)
+    features = torch.tensor(scaled(given, bare.mean, bare.scale))
+    members = []
+    for k in range(MEMBERS):
+        seed = MEMBERS * terms.seed + k
+        member = pointer.Pointer(given.shape[2], seed)
+        one = partial(tick, k, f"learning, network {k + 1} of {MEMBERS}")
+        reward = torch.tensor(table.reward[rows], dtype=torch.float32)
+        if terms.algorithm == "ppo":
+            ppo.learn(member, table, bare, seed, one)
+        else:
+            exact_gradient.learn(member, features, torch.tensor(mask), reward, seed, one)
+        if z is not None:
+            known = np.isfinite(z)
+            reward = torch.tensor(np.where(known, 1.0 - z, 0.0), dtype=torch.float32)
+            own = torch.tensor(known)
+            exact_gradient.learn(member, features, own, reward, seed, one, clone=False)
+        members.append(member)
+    return pointer.export(members, bare.mean, bare.scale, notes)
+
+
+def _agree(asked: dict[str, Any], out: Path) -> None:
+    """Record the terms in the folder, or check that they are those of the training in it."""
     file = out / "training.json"
-    asked: dict[str, Any] = asdict(terms) | {"version": __version__, "mechanics": MECHANICS}
-    _whole(out / "checkpoint.zip")
-    stages = [asked.pop("episodes")]
     if file.is_file():
         try:
             found = msgspec.json.decode(file.read_bytes(), type=dict[str, Any])
-            before = msgspec.convert(found.pop("episodes"), list[int])
-        except (msgspec.MsgspecError, KeyError, RecursionError) as error:
-            raise BadInput("terms", str(file), f"{ANEW} ({error})") from None
+        except msgspec.MsgspecError as error:
+            hint = f"remove the damaged training, or name another folder with --out ({error})"
+            raise BadInput("terms", str(file), hint) from None
         check_terms(asked, found, f"the training in {out}")
-        if terms.episodes < before[-1]:
-            mend = f"give at least {before[-1]}, as for the training in {out}, or another folder"
-            raise BadInput("episodes", terms.episodes, mend)
-        stages = sorted({*before, *stages})
-    elif (out / "checkpoint.zip").is_file():
-        raise BadInput("terms", str(file), f"{ANEW} (it is missing beside checkpoint.zip)")
     with atomic(file) as part:
-        part.write_bytes(msgspec.json.encode(asked | {"episodes": stages}))
-    return stages
+        part.write_bytes(msgspec.json.encode(asked))
 
 
-def _whole(checkpoint: Path) -> None:
-    """Check that the checkpoint of a training is undamaged, if there is one."""
-    try:
-        with zipfile.ZipFile(checkpoint) as archive:
-            lost = archive.testzip() or min(
-                {"data", "policy.pth"} - {*archive.namelist()}, default=""
-            )
-    except FileNotFoundError:
-        return
-    except (OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise BadInput("checkpoint", str(checkpoint), f"{ANEW} ({error})") from None
-    if lost:
-        raise BadInput("checkpoint", str(checkpoint), f"{ANEW} ({lost} in it is damaged)")
+def family_of(name: str) -> str:
+    """Return the family of a generated site."""
+    return built_in(*instance(name))
+
+
+def best_of_families(table: ForecastTable) -> dict[str, list[int]]:
+    """Return for each family the catalogue in the order of mean forecast Z on its training sites.
+
+    A layout that cannot be built on a site counts as no barrier there. Layouts are given by their
+    numbers in the catalogue, the best first.
+    """
+    rows = table.rows("train")
+    families = np.array([family_of(table.names[row]) for row in rows])
+    reward = table.reward[rows]
+    return {
+        name: np.argsort(-reward[families == name].mean(axis=0), kind="stable").tolist()
+        for name in dict.fromkeys(families.tolist())
+    }
+
+
+def methods(policy: Policy, table: ForecastTable, problem: DesignProblem) -> dict[str, Layout]:
+    """Return the layouts of the policy and of the rules that it is compared with.
+
+    The rules are no barrier, the constant, the engineering rule and the best layout of the family
+    that can be built (`best_of_families`), which is told the family of the site.
+    """
+    menu = Menu(problem)
+    order = best_of_families(table).get(family_of(problem.site.name), [0])
+    family = (placed(menu, table.layouts[i]) for i in order)
+    found = {
+        "nothing": (),
+        "constant": constant(problem, menu),
+        "rule": answer(problem).layout,
+        "best of the family": next((layout for layout in family if layout is not None), ()),
+        "policy": decide(policy, problem),
+    }
+    return {name: layout if problem.fits(layout) else () for name, layout in found.items()}
+
+
+def compare(
+    policy: Policy, out: Path, terms: Terms, count: int, releases: int, tick: Tick
+) -> list[Compared]:
+    """Compare a policy with simple rules on validation sites.
+
+    Parameters
+    ----------
+    policy : Policy
+        The policy.
+    out : Path
+        The folder of its training.
+    terms : Terms
+        The terms of its training.
+    count : int
+        Number of the first validation sites that are tried.
+    releases : int
+        Number of fresh releases of each layout, the same for all methods.
+    tick : callable
+        Called with the number of completed sites and a description.
+
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
+    """
+    table, store = table_of(terms, out, tick), Store(out / "evaluations.jsonl")
+    return compared(policy, table, sites.split("validation")[:count], releases, store, tick)
+
+
+def compared(
+    policy: Policy, table: ForecastTable, names: Sequence[str], releases: int, store: Store,
+    tick: Tick,
+) -> list[Compared]:  # fmt: skip
+    """Return Z of the policy and of simple rules on some sites, on the same fresh releases.
+
+    Sites with an event of `MASS` blocks or more are left out.
+
+    Raises
+    ------
+    Diverged
+        If a simulation diverges.
+    """
+    found = []
+    for i, name in enumerate(names):
+        tick(i, f"comparison on {name}")
+        problem = forecasts.problem(name)
+        if max(largest(problem.site, event) for event in problem.site.event_names) >= MASS:
+            continue
+        for method, layout in methods(policy, table, problem).items():
+            z = verify(problem, layout, releases, FRESH, store).objective if layout else None
+            nothing = problem.nothing.objective
+            found.append(Compared(name, method, nothing if z is None else z, nothing))
+    return found
+
+
+def relative(rows: Sequence[Compared], method: str) -> Floats:
+    """Return Z of a method over Z without barriers on each site [-]."""
+    return np.array([row.z / row.nothing for row in rows if row.method == method])

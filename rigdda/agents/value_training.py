@@ -25,9 +25,8 @@ from rigdda.agents.designers.forecast import Forecast, forecast_seeds
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.race import joined
-from rigdda.agents.policy import Network
+from rigdda.agents.network import Network, scaling
 from rigdda.agents.run_record import check_terms
-from rigdda.agents.training import scaling
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
 from rigdda.files import atomic
@@ -115,8 +114,8 @@ class Samples:
             with np.load(path) as file:
                 return cls(file["features"], file["share"], file["weight"])
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-            mend = f"this is damaged: remove this file and repeat the command ({error})"
-            raise BadInput("samples", str(path), mend) from None
+            hint = f"this is damaged: remove this file and repeat the command ({error})"
+            raise BadInput("samples", str(path), hint) from None
 
 
 def train(terms: ValueTerms, out: Path, tick: Tick) -> Network:
@@ -150,8 +149,8 @@ def _agree(terms: ValueTerms, out: Path) -> None:
         try:
             found = msgspec.json.decode(file.read_bytes(), type=dict[str, Any])
         except msgspec.MsgspecError as error:
-            mend = f"remove the damaged training, or name another folder with --out ({error})"
-            raise BadInput("terms", str(file), mend) from None
+            hint = f"remove the damaged training, or name another folder with --out ({error})"
+            raise BadInput("terms", str(file), hint) from None
         check_terms(asked, found, f"the training in {out}")
     with atomic(file) as part:
         part.write_bytes(msgspec.json.encode(asked))
@@ -273,8 +272,8 @@ def fit(samples: list[Samples], seed: int, notes: dict[str, str]) -> Network:
     try:
         import torch
     except ModuleNotFoundError as error:
-        mend = f"install {error.name}: pip install 'rigdda[rl]'"
-        raise BadInput("model", "value", mend) from None
+        hint = f"install {error.name}: pip install 'rigdda[rl]'"
+        raise BadInput("model", "value", hint) from None
     features = np.concatenate([s.features for s in samples]).astype(np.float32)
     mean, scale = scaling(features)
     inputs = np.clip((features - mean) / scale, -3.0, 3.0)

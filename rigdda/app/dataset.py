@@ -27,7 +27,7 @@ from rigdda.agents.designers.constant import CONSTANTS, place
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.limits import JOB_RELEASES, SEED
-from rigdda.agents.policy import features
+from rigdda.agents.network import features
 from rigdda.agents.run_record import check_terms
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem

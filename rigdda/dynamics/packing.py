@@ -293,11 +293,11 @@ def check_step(settings: Settings, areas: NDArray[np.float64], gravity: float) -
     most = longest_step(areas, gravity)
     if settings.dt > most and settings.mode == "dynamic":
         sizes = np.sqrt(areas)
-        mend = (
+        hint = (
             f"give at most {math.floor(1e5 * most) / 1e5:g} s: the blocks are {sizes.min():.2g} to "
             f"{sizes.max():.2g} m large, and contacts would sink in"
         )
-        raise BadInput("dt", settings.dt, mend)
+        raise BadInput("dt", settings.dt, hint)
 
 
 def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:

@@ -401,7 +401,7 @@ def stratified(site: Site, layout: Layout, found: Account, facts: Mapping[str, F
     """
     parts: list[tuple[Mean, ...]] = []
     tolls: list[tuple[Mean, ...]] = []
-    mend = _mending(site, layout)
+    largest_repair = _largest_repair(site, layout)
     by_event: dict[str, float] = {}
     for name in site.event_names:
         rate, own = site.rate(name, layout), found.of(found.event == name)
@@ -411,7 +411,7 @@ def stratified(site: Site, layout: Layout, found: Account, facts: Mapping[str, F
         if not len(own.harm):
             raise BadInput("outcomes", f"none of {name}", "include releases of every event")
         known = facts.get(name)
-        parts.append(tuple(part.times(rate) for part in _means(own, known, mend)))
+        parts.append(tuple(part.times(rate) for part in _means(own, known, largest_repair)))
         by_event[name] = parts[-1][2].value
         tolls.append(tuple(part.times(rate) for part in toll_means(own, known)))
     harm, repair, both, volume = (total(part[i] for part in parts) for i in range(4))
@@ -443,7 +443,9 @@ def _weighted(
         None if found.toll is None else weight[:, None] * found.toll,
     )
     mixed = _mixture(rate, facts, shares) if facts else None
-    harm, repair, both, volume = _means(drawn, mixed, _mending(site, layout) * sum(rate.values()))
+    harm, repair, both, volume = _means(
+        drawn, mixed, _largest_repair(site, layout) * sum(rate.values())
+    )
     often = {name: rate[name] * fact.reached / fact.releases for name, fact in facts.items()}
     seen = {n: float((found.event == n).mean()) / shares[n] for n in often}
     dear = {n: (1.0 - seen[n]) * often[n] * facts[n].harm.mean for n in often}
@@ -484,13 +486,15 @@ def _mixture(
     return Facts(1, 1, known(lambda f: f.harm), known(lambda f: f.volume), 1.0, tolls)
 
 
-def _means(own: Account, known: Facts | None, mend: float) -> tuple[Mean, Mean, Mean, Mean]:
+def _means(
+    own: Account, known: Facts | None, largest_repair: float
+) -> tuple[Mean, Mean, Mean, Mean]:
     """Return the means of harm, repair, their sum and volume over equally weighted releases.
 
     Harm can occur without a block on the road if a wall slides onto it.
     """
     harm = cost(own.harm, own.reached | (own.harm > 0.0), known.harm if known else None)
-    repair = cost(own.repair, own.failed, Known(mend, REPAIR_VARIATION))
+    repair = cost(own.repair, own.failed, Known(largest_repair, REPAIR_VARIATION))
     volume = cost(own.volume, own.reached, known.volume if known else None)
     return harm, repair, pair(harm, repair, _correlation(own.harm, own.repair)), volume
 
@@ -521,7 +525,7 @@ def _probabilities(names: Sequence[str], found: Account, happened: Bools) -> dic
     return out
 
 
-def _mending(site: Site, layout: Layout) -> float:
+def _largest_repair(site: Site, layout: Layout) -> float:
     """Return the repair cost of the most expensive barrier that can fail [EUR].
 
     It is the cost of one fence panel length, the least unit of repair; 0 if no barrier can fail.

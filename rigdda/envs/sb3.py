@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
 from rigdda import BadInput
+from rigdda.envs.forecast_environment import BarrierForecastVector
 from rigdda.envs.vector import BarrierVector, stacked
 
 
@@ -111,10 +112,88 @@ class Bridge(VecEnv):
         return [self.batch.copies[i] for i in self._get_indices(indices)]
 
 
+class ForecastBridge(VecEnv):
+    """Adapter of a batch of `BarrierForecast`, which has no separate copies.
+
+    Parameters
+    ----------
+    batch : BarrierForecastVector
+        The environment.
+
+    Raises
+    ------
+    BadInput
+        If its autoreset mode is not SAME_STEP.
+    """
+
+    def __init__(self, batch: BarrierForecastVector):
+        if batch.mode is not AutoresetMode.SAME_STEP:
+            hint = f"give {AutoresetMode.SAME_STEP.value}, which Stable-Baselines3 needs"
+            raise BadInput("autoreset_mode", batch.mode.value, hint)
+        self.batch, self.render_mode = batch, None
+        super().__init__(batch.num_envs, batch.single_observation_space, batch.single_action_space)
+        self._actions: NDArray[np.int64] = np.zeros(batch.num_envs, dtype=np.int64)
+
+    def reset(self) -> Any:
+        """Start an episode in every copy, with the pending seeds."""
+        seen, _ = self.batch.reset(seed=self._seeds)
+        self._reset_seeds()
+        self._reset_options()
+        return seen
+
+    def step_async(self, actions: NDArray[np.int64]) -> None:
+        """Store the actions of the next step."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[Any, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Step every copy; all of them restart, with the last observation in the info."""
+        seen, rewards, dones, _, infos = self.batch.step(self._actions)
+        told = [
+            {"terminal_observation": last, "TimeLimit.truncated": False}
+            for last in infos["final_obs"]
+        ]
+        return seen, rewards.astype(np.float32), dones, told
+
+    def close(self) -> None:
+        """Close the environment."""
+        self.batch.close()
+
+    def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
+        """Return an attribute of the batch for each selected copy."""
+        return [getattr(self.batch, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(
+        self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None
+    ) -> None:
+        """Refuse: the copies have no attributes of their own."""
+        raise BadInput("attribute", attr_name, "copies of this environment share all attributes")
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: int | Iterable[int] | None = None,
+        **method_kwargs: Any,
+    ) -> list[Any]:
+        """Return the rows of a method of the batch, such as `action_masks`, for some copies."""
+        rows = getattr(self.batch, method_name)(*method_args, **method_kwargs)
+        return [rows[i] for i in self._get_indices(indices)]
+
+    def env_is_wrapped(
+        self,
+        wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]],
+        indices: int | Iterable[int] | None = None,
+    ) -> list[bool]:
+        """Return False for each selected copy: copies are never wrapped."""
+        return [False for _ in self._get_indices(indices)]
+
+
 def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:
     """Return a vectorised environment for Stable-Baselines3; see `rigdda.envs.sb3_vec_env`."""
     batch = gymnasium.make_vec(
         id, num_envs=num_envs, vectorization_mode="vector_entry_point", **keywords
     )
+    if isinstance(batch, BarrierForecastVector):
+        return VecMonitor(ForecastBridge(batch))
     assert isinstance(batch, BarrierVector)
     return VecMonitor(Bridge(batch))

@@ -11,7 +11,7 @@ from hypothesis import given
 
 from rigdda import BadInput, Layout
 from rigdda.agents.corridor.agent import CorridorAgent, Offer, Prospect, offer, prospect, shipped
-from rigdda.agents.policy import Network
+from rigdda.agents.network import Network
 from rigdda.barriers import describe
 from rigdda.envs import DesignProblem
 from rigdda.envs.corridor_environment import CorridorDesign

@@ -34,7 +34,7 @@ SEARCHES = ("cma", "pareto", "race", "random", "tpe")
 FIXED = ("constant", "rule")
 """Designers that search, and those that give one layout."""
 
-ALL = (*SEARCHES, "convex", "value", *FIXED)
+ALL = (*SEARCHES, "convex", "policy", "value", *FIXED)
 
 
 def design(name: str, problem: DesignProblem, simulations: int, seed: int = 0) -> DesignResult:

@@ -15,7 +15,7 @@ from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble
 from rigdda.agents.designers.forecast import LAYOUT_FEATURES, Forecast, value_network
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.surrogate import Surrogate
-from rigdda.agents.policy import Network
+from rigdda.agents.network import Network
 from rigdda.envs import DesignProblem
 
 

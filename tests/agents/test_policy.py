@@ -10,26 +10,22 @@ import numpy as np
 import pytest
 from safetensors.numpy import save_file
 
-from rigdda import BadInput, Site
-from rigdda.agents import policy
-from rigdda.agents.policy import ANCHOR, FEATURES, NAMES, SLOTS, Network, decide, features
+from rigdda import MECHANICS, BadInput, Site
+from rigdda.agents.designers import policy
+from rigdda.agents.designers.menu import Menu
+from rigdda.agents.designers.policy import Policy, decide
+from rigdda.agents.learning.forecasts import FEATURES, of_site
+from rigdda.agents.learning.relative_layouts import NOTHING, candidates, placed
+from rigdda.agents.network import NAMES, WIDTH, Network, features
 from rigdda.envs import DesignProblem
 from rigdda.envs.observation import FIELDS, observe
 
 
-def network(outputs: np.ndarray, inputs: int = FEATURES) -> Network:
+def network(outputs: np.ndarray, inputs: int = WIDTH) -> Network:
     """A network that always says the same."""
     layer = (np.zeros((len(outputs), inputs), np.float32), outputs.astype(np.float32))
     zeros, ones = np.zeros(inputs, np.float32), np.ones(inputs, np.float32)
     return Network(zeros, ones, [layer], {})
-
-
-def saying(*slots: tuple[float, float, float, float, str]) -> Network:
-    """A network that asks for barriers: presence, station, height, size and kind of each."""
-    wanted = np.full((SLOTS.count, SLOTS.width), -1.0)
-    for row, (*numbers, kind) in zip(wanted, slots, strict=False):
-        row[: len(numbers)], row[len(numbers) + SLOTS.kinds.index(kind)] = numbers, 1.0
-    return network(wanted.ravel() - ANCHOR)
 
 
 def seen_at(problem: DesignProblem) -> np.ndarray:
@@ -40,25 +36,12 @@ def test_features_are_what_is_seen_of_the_site(site: Site) -> None:
     problem = DesignProblem(site)
     seen = observe(problem)
     line = features(seen)
-    assert line.shape == (FEATURES,) and line.dtype == np.float32 and np.isfinite(line).all()
+    assert line.shape == (WIDTH,) and line.dtype == np.float32 and np.isfinite(line).all()
     assert set(seen) == set(NAMES)
     np.testing.assert_array_equal(line[: FIELDS[NAMES[0]].size], seen[NAMES[0]])
 
 
-def test_it_decides_without_torch_or_a_search(tmp_path: Path) -> None:
-    file = tmp_path / "it.safetensors"
-    saying((1.0, 0.5, 0.0, 0.0, "ditch")).save(file)
-    code = (
-        "import sys; sys.modules['torch'] = sys.modules['stable_baselines3'] = None\n"
-        "from rigdda.envs import DesignProblem; from rigdda.agents import policy\n"
-        f"found = policy.using(policy.load({str(file)!r}))(DesignProblem('quick'), 8)\n"
-        "assert found.simulations == 8 and len(found.history.entries) == 1\n"
-        "assert [b.kind for b in found.layout] == ['ditch']\n"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
-def test_a_policy_survives_its_file(site: Site, tmp_path: Path) -> None:
+def test_a_network_survives_its_file(site: Site, tmp_path: Path) -> None:
     seen = seen_at(DesignProblem(site))
     rng = np.random.default_rng(0)
     layers = [
@@ -76,10 +59,6 @@ def test_a_policy_survives_its_file(site: Site, tmp_path: Path) -> None:
     assert read(1e9 * seen) == pytest.approx(read(1e6 * seen))  # features are clipped
 
 
-def test_a_network_that_adds_nothing_builds_one_barrier(site: Site) -> None:
-    assert len(decide(network(np.zeros(SLOTS.size)), DesignProblem(site))) == 1
-
-
 @pytest.mark.parametrize("content", [None, b"", b"no tensors"])
 def test_another_file_is_refused(content: bytes | None, tmp_path: Path) -> None:
     file = tmp_path / "it.safetensors"
@@ -89,28 +68,90 @@ def test_another_file_is_refused(content: bytes | None, tmp_path: Path) -> None:
         Network.load(file)
 
 
-@pytest.mark.parametrize("slots", [1, 2, 3, 5])
-@pytest.mark.parametrize("kinds", [None, ("fence",), ("wall", "ditch")])
-def test_it_fits_any_problem(slots: int, kinds: tuple[str, ...] | None, site: Site) -> None:
-    problem = DesignProblem(site, slots, kinds)
-    asked = [(1.0, -0.9, -0.5, -0.9, "fence"), (1.0, 0.0, 0.0, -0.9, "fence")]
-    layout = decide(saying(*asked, (1.0, 1.0, -0.5, -0.9, "ditch")), problem)
-    assert problem.fits(layout) and len(layout) <= min(slots, 3)
-    assert layout or "fence" not in problem.kinds  # a ditch finds no room on a face
-    assert {barrier.kind for barrier in layout} <= set(problem.kinds) - {"wall"}
+DITCH = '[{"kind": "ditch", "depth": 2.0, "width": 5.0, "station": 1.0}]'
+FENCE = '[{"kind": "fence", "height": 3.0, "energy_class": 500, "station": 0.0}]'
+BOTH = "[" + FENCE[1:-1] + ", " + DITCH[1:-1] + "]"
+CATALOGUE = (NOTHING, DITCH, FENCE, BOTH)
 
 
-def test_what_it_cannot_build_is_refused(site: Site) -> None:
-    with pytest.raises(BadInput, match=r"kinds = \('wall',\): allow a kind"):
-        decide(saying(), DesignProblem(site, kinds=("wall",)))
+def preferring(weights: dict[int, float]) -> Policy:
+    """Return a policy whose score of a layout is a weighted sum of its features."""
+    row = np.zeros((1, FEATURES), np.float32)
+    for place, weight in weights.items():
+        row[0, place] = weight
+    zeros, ones = np.zeros(FEATURES, np.float32), np.ones(FEATURES, np.float32)
+    return Policy(Network(zeros, ones, [(row, np.zeros(1, np.float32))], {}), CATALOGUE)
 
 
-def test_it_keeps_to_the_zone(site: Site) -> None:
+COST, FORECAST = 0, 2
+"""Features of a layout: its annual cost, and its forecast Z, over Z without barriers."""
+
+
+def test_the_layout_with_the_highest_score_is_built(site: Site) -> None:
+    problem = DesignProblem(site)
+    found = of_site(problem, CATALOGUE)
+    least = decide(preferring({FORECAST: -1.0}), problem)
+    assert least == found.layouts[int(np.nanargmin(found.z))] != ()
+    assert decide(preferring({COST: -1.0}), problem) == ()
+    dearest = decide(preferring({COST: 1.0}), problem)
+    assert [barrier.kind for barrier in dearest] == ["fence", "ditch"]
+
+
+def test_features_begin_with_cost_risk_and_forecast(site: Site) -> None:
+    problem = DesignProblem(site)
+    found = of_site(problem, CATALOGUE)
+    for layout, row, z in zip(found.layouts, found.features, found.z, strict=True):
+        assert layout is not None
+        assert row[0] == pytest.approx(site.annual(layout) / problem.nothing.objective)
+        assert row[0] + row[1] == pytest.approx(row[2]) == pytest.approx(z)
+    assert found.z[0] == pytest.approx(1.0) and (found.z[1:] < 1.0).any()
+
+
+def test_only_layouts_that_a_problem_allows_are_built(site: Site) -> None:
+    dearest = preferring({COST: 1.0})
+    assert [b.kind for b in decide(dearest, DesignProblem(site, 1))] == ["fence"]
+    assert [b.kind for b in decide(dearest, DesignProblem(site, kinds=("ditch",)))] == ["ditch"]
+    assert decide(dearest, DesignProblem(site, kinds=("wall",))) == ()
+    assert decide(dearest, DesignProblem(site, max_cost=0.5)) == ()
     zone = site.barrier_zone
     middle = 0.5 * (zone.start + zone.end)
     problem = DesignProblem(site, zone=(middle, zone.end))
-    (fence,) = decide(saying((1.0, -1.0, 0.0, -0.9, "fence")), problem)
-    assert fence.x >= middle and problem.fits((fence,))
+    layout = decide(dearest, problem)
+    assert layout[0].x >= middle and problem.fits(layout)
+
+
+def test_every_candidate_is_understood(site: Site) -> None:
+    menu = Menu(DesignProblem(site))
+    listed = candidates()
+    assert listed[0] == NOTHING and len(set(listed)) == len(listed)
+    found = [placed(menu, relative) for relative in listed]
+    assert found[0] == () and sum(layout is not None for layout in found) > 100
+    with pytest.raises(BadInput, match="layouts"):
+        placed(menu, '[{"kind": "fence", "tall": 1.0, "station": 0.0}]')
+    with pytest.raises(BadInput, match="layouts"):
+        placed(menu, "[1]")
+
+
+def test_a_policy_survives_its_file_and_needs_no_torch(tmp_path: Path) -> None:
+    file = tmp_path / "it.safetensors"
+    preferring({COST: 1.0}).save(file)
+    read = policy.load(file)
+    assert read.layouts == CATALOGUE and read.network.notes == {}
+    code = (
+        "import sys; sys.modules['torch'] = sys.modules['stable_baselines3'] = None\n"
+        "from rigdda.envs import DesignProblem; from rigdda.agents.designers import policy\n"
+        "from rigdda import agents\n"
+        f"found = policy.using(policy.load({str(file)!r}))(DesignProblem('quick'), 8)\n"
+        "assert found.simulations <= 8 and len(found.history.entries) == 1\n"
+        "assert [b.kind for b in found.layout] == ['fence', 'ditch']\n"
+        "assert agents.policy.design(DesignProblem('quick'), 8).simulations <= 8\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_policy_that_ships_says_how_it_was_made() -> None:
+    notes = policy.load().network.notes
+    assert notes["command"].startswith("rigdda train") and notes["mechanics"] == MECHANICS
 
 
 SHAPE = "no policy of this version"
@@ -127,8 +168,8 @@ def test_a_network_of_another_shape_is_refused(tmp_path: Path) -> None:
     [
         ({"mean": np.float32(0.0)}, SHAPE),
         ({"bias": np.float32(0.0)}, SHAPE),
-        ({"bias": np.full(SLOTS.size, np.nan)}, "finite numbers"),
-        ({"weight": np.full((SLOTS.size, FEATURES), np.inf)}, "finite numbers"),
+        ({"bias": np.full(1, np.nan)}, "finite numbers"),
+        ({"weight": np.full((1, FEATURES), np.inf)}, "finite numbers"),
         ({"scale": np.zeros(FEATURES)}, "positive scales"),
     ],
 )
@@ -136,7 +177,7 @@ def test_a_damaged_network_is_refused(
     change: dict[str, np.ndarray], words: str, tmp_path: Path
 ) -> None:
     whole = {"mean": np.zeros(FEATURES), "scale": np.ones(FEATURES)}
-    whole |= {"weight": np.zeros((SLOTS.size, FEATURES)), "bias": np.zeros(SLOTS.size)} | change
+    whole |= {"weight": np.zeros((1, FEATURES)), "bias": np.zeros(1)} | change
     names = {"weight": "weight 0", "bias": "bias 0"}
     file = tmp_path / "damaged.safetensors"
     save_file({names.get(k, k): np.array(v, np.float32) for k, v in whole.items()}, file)

@@ -1,282 +1,196 @@
-"""Training, small but real: PPO on a pool of sites, and going on after a kill."""
+"""Training of a policy on tables made for the purpose, and from the command line."""
 
 from __future__ import annotations
 
-import shutil
-import time
-import zipfile
+import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
-from processes import refused, rig, run
+from processes import refused, run
 
-from rigdda import sites
-from rigdda.agents import policy, training
-from rigdda.agents.designers import ppo
-from rigdda.agents.policy import FEATURES, SLOTS, Network, decide
-from rigdda.envs import DesignProblem
+from rigdda import MECHANICS, BadInput, sites
+from rigdda.agents import training
+from rigdda.agents.designers.policy import Policy, load
+from rigdda.agents.learning import forecasts, outcomes
+from rigdda.agents.learning.forecasts import FEATURES, SiteForecasts
+from rigdda.agents.network import Network
+from rigdda.agents.training import Terms
+from rigdda.envs import forecast_table
+from rigdda.envs.forecast_table import WIDTH, ForecastTable
 
-SMALL = ("--sites", 2, "--episodes", 16)
-
-
-@pytest.fixture(scope="module")
-def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The folder and the words of a small training."""
-    folder = tmp_path_factory.mktemp("trained")
-    return folder, run("train", *SMALL, "--out", folder, folder=folder)
+LAYOUTS = ("[]", *(f'[{{"kind": "mesh", "rank": {i}}}]' for i in range(5)))
 
 
-@pytest.mark.slow
-def test_a_training_leaves_a_policy_and_its_logs(trained: tuple[Path, str]) -> None:
-    folder, words = trained
-    assert list((folder / "ppo_0").glob("events.out.tfevents*"))
-    notes = Network.load(folder / "policy.safetensors").notes
-    assert notes["command"] == "rigdda train --sites 2 --episodes 16 --seed 0"
-    assert "before" in words and "after" in words
+@pytest.fixture
+def table(monkeypatch: pytest.MonkeyPatch) -> ForecastTable:
+    """Return a table in which Z is a function of two features, and let it be the one that ships."""
+    rng = np.random.default_rng(3)
+    names = (*sites.split("train")[:30], *sites.split("validation")[:10])
+    features = np.zeros((40, 6, FEATURES), np.float32)
+    features[..., :3] = rng.normal(size=(40, 6, 3))
+    features[:, 0, :3] = 3.0  # no barrier
+    z = 0.5 + 0.2 * np.tanh(features[..., 0] + features[..., 1])
+    z[:, 0] = 1.0
+    z[rng.random(z.shape) < 0.2] = np.nan
+    z[:, 0] = 1.0
+    seen = np.zeros((40, WIDTH), np.float32)
+    made = ForecastTable(names, LAYOUTS, seen, features, z, {"mechanics": MECHANICS})
+    monkeypatch.setattr(forecast_table, "load", lambda: made)
+    return made
 
 
-@pytest.mark.slow
-def test_a_policy_is_tried_on_unseen_sites(trained: tuple[Path, str], tmp_path: Path) -> None:
-    """On the built-in site quick, which no training sees, by the designer that loads the file."""
-    design = policy.using(policy.load(trained[0] / "policy.safetensors"))
-    posed = DesignProblem("quick")
-    found = design(posed, 30, seed=1)
-    assert posed.fits(found.layout) and found.simulations == 30
-    assert found.evaluation.releases == 30 and len(found.history.entries) == 1
-    assert design(posed, 30, seed=1) == found
+def chosen_z(policy: Policy, table: ForecastTable, split: str) -> float:
+    """Return the mean Z of the chosen layouts minus the least possible."""
+    rows = table.rows(split)
+    mask = table.mask[rows]
+    best = policy.choose(table.features[rows], mask)
+    assert mask[np.arange(len(rows)), best].all()
+    z = table.z[rows]
+    return float(np.mean(z[np.arange(len(rows)), best] - np.nanmin(z, axis=1)))
 
 
-@pytest.mark.slow
-def test_a_killed_training_goes_on(trained: tuple[Path, str], tmp_path: Path) -> None:
-    more = (*SMALL[:2], "--episodes", 64)
-    killed = rig("train", *more, "--out", "o", folder=tmp_path)
-    checkpoint = tmp_path / "o/checkpoint.zip"
-    while not checkpoint.is_file():
-        assert killed.poll() is None
-        time.sleep(0.02)
-    killed.kill()
-    killed.communicate()
-    assert run("train", *more, "--out", "o", folder=tmp_path).startswith(
-        "mean relative reduction of Z"
-    )
-    assert ppo.PPO.load(checkpoint).num_timesteps == 64
-    last = Network.load(tmp_path / "o/policy.safetensors").layers[-1][0]
-    assert (last != Network.load(trained[0] / "policy.safetensors").layers[-1][0]).any()
-    line = refused("train", *more, "--seed", 1, "--out", "o", folder=tmp_path)
-    assert "seed = 1" in line and "another folder" in line
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("rollouts", [1, 5])
-def test_a_training_that_was_stopped_ends_as_if_it_had_not_been(
-    rollouts: int, tmp_path: Path
+@pytest.mark.parametrize("algorithm", training.ALGORITHMS)
+def test_a_policy_learns_what_makes_a_layout_good(
+    algorithm: str, table: ForecastTable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    terms = training.Terms(2, 40, 3)
-    whole = training.train(terms, tmp_path / "whole", lambda done: None)
+    pytest.importorskip("torch")
+    from rigdda.agents.learning import exact_gradient, ppo
 
-    def stop(done: int) -> None:
-        if done > 4 * rollouts:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        training.train(terms, tmp_path / "stopped", stop)
-    np.random.seed(99)  # noqa: NPY002
-    seen: list[int] = []
-    rest = training.train(terms, tmp_path / "stopped", seen.append)
-    assert seen[0] == 4 * rollouts + 2
-    for (weight, bias), (other, last) in zip(
-        whole.network.layers, rest.network.layers, strict=True
-    ):
-        assert (weight == other).all() and (bias == last).all()
-    files = [tmp_path / name / "policy.safetensors" for name in ("whole", "stopped")]
+    monkeypatch.setattr(training, "MEMBERS", 1)
+    monkeypatch.setattr(exact_gradient, "STEPS", 150)
+    monkeypatch.setattr(ppo, "ITERATIONS", 30)
+    policy = training.train(Terms(algorithm=algorithm), tmp_path, lambda *_: None)
+    first = float(np.mean(np.nanmean(table.z, axis=1) - np.nanmin(table.z, axis=1)))
+    assert chosen_z(policy, table, "train") < 0.2 * first
+    assert chosen_z(policy, table, "validation") < 0.5 * first  # sites that it has not seen
+    read = load(tmp_path / "policy.safetensors")
+    assert (
+        read.layouts == LAYOUTS
+        and read.network.notes["command"] == Terms(algorithm=algorithm).command
+    )
+    again = tmp_path / "again"
+    again.mkdir()
+    training.train(Terms(algorithm=algorithm), again, lambda *_: None)
+    files = [folder / "policy.safetensors" for folder in (tmp_path, again)]
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
-@pytest.mark.slow
-def test_a_training_goes_on_with_more_episodes(trained: tuple[Path, str], tmp_path: Path) -> None:
-    folder = tmp_path / "o"
-    shutil.copytree(trained[0], folder)
-    before = Network.load(folder / "policy.safetensors").layers[-1][0]
-    run("train", *SMALL[:2], "--episodes", 32, "--out", folder, folder=tmp_path)
-    assert ppo.PPO.load(folder / "checkpoint.zip").num_timesteps == 32
-    after = Network.load(folder / "policy.safetensors")
-    assert (after.layers[-1][0] != before).any()
-    one = "rigdda train --sites 2 --episodes {} --seed 0"
-    assert after.notes["command"] == f"{one.format(16)}; {one.format(32)}"
-    line = refused("train", *SMALL, "--out", folder, folder=tmp_path)
-    assert "episodes = 16: give at least 32" in line and "another folder" in line
+def test_outcomes_correct_what_forecasts_say(
+    table: ForecastTable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Forecasts reward a low sum of two features, and outcomes a high one."""
+    pytest.importorskip("torch")
+    done: list[str] = []
+
+    def corrected(known: ForecastTable, row: int, count: int) -> np.ndarray:
+        done.append(known.names[row])
+        if len(done) == 12:
+            raise KeyboardInterrupt
+        return np.where(known.mask[row], 1.0 - known.z[row], np.nan)
+
+    monkeypatch.setattr(outcomes, "corrected", corrected)
+    monkeypatch.setattr(training, "MEMBERS", 1)
+    terms = Terms(simulate=5)
+    with pytest.raises(KeyboardInterrupt):
+        training.train(terms, tmp_path, lambda *_: None)
+    policy = training.train(terms, tmp_path, lambda *_: None)
+    assert len(done) == 30 + 1  # only the interrupted site is repeated
+    rows = table.rows("validation")
+    best = policy.choose(table.features[rows], table.mask[rows])
+    z = table.z[rows]
+    assert np.mean(z[np.arange(10), best]) > np.nanmean(z[:, 1:]) + 0.05
+    with pytest.raises(BadInput, match="another folder"):
+        training.train(Terms(simulate=4), tmp_path, lambda *_: None)
+
+
+def test_outcomes_and_forecasts_are_weighted_with_their_precision() -> None:
+    from light_site import LIGHT
+
+    from rigdda.envs import DesignProblem
+
+    problem = DesignProblem(LIGHT)
+    n = len(LIGHT.event_names)
+    sure, unsure = np.full(n, 1e-9), np.full(n, 1e9)
+    assert outcomes._remaining(problem, np.full(n, 0.3), sure, 0.6) == pytest.approx(0.3, abs=1e-3)
+    assert outcomes._remaining(problem, np.full(n, 0.3), unsure, 0.6) == pytest.approx(0.6)
+    assert outcomes._remaining(problem, np.full(n, np.nan), sure, 0.6) == pytest.approx(0.6)
+
+
+def test_the_catalogue_serves_all_sites() -> None:
+    z = np.full((3, 6), 0.9)
+    z[:, 0] = 1.0
+    z[0, 1] = z[1, 4] = z[2, 5] = 0.1
+    z[:, 2] = np.nan
+    listed = ["[]", "a", "b", "c", "d", "e"]
+    assert forecasts.choose(z, listed, 4) == [0, 1, 4, 5]
+    assert forecasts.choose(z, listed, 99) == list(range(6))
+
+
+def test_forecasts_of_another_catalogue_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "a.npz"
+    own = SiteForecasts(np.zeros(WIDTH, np.float32), np.zeros((2, FEATURES)), np.ones(2))
+    own.save(file, ["[]", "a"])
+    read = SiteForecasts.load(file, ["[]", "a"])
+    assert (read.z == own.z).all()
+    with pytest.raises(BadInput, match="another version"):
+        SiteForecasts.load(file, ["[]", "b"])
+    file.write_bytes(b"PK")
+    with pytest.raises(BadInput, match="damaged"):
+        SiteForecasts.load(file, ["[]", "a"])
+
+
+def test_the_best_layout_of_a_family_is_chosen_on_its_training_sites(table: ForecastTable) -> None:
+    best = training.best_of_families(table)
+    assert set(best) == {"verge", "bench", "talus", "narrow", "cliff", "shu-hwa"}
+    rows = [r for r in table.rows("train") if training.family_of(table.names[r]) == "talus"]
+    mean = np.where(table.mask[rows], table.z[rows], 1.0).mean(axis=0)
+    assert best["talus"][0] == int(mean.argmin()) and best["talus"][-1] == int(mean.argmax())
+
+
+def test_the_value_of_the_policy_is_shown_beside_simple_rules(tmp_path: Path) -> None:
+    """A comparison on two light sites, by the command."""
+    pytest.importorskip("torch")
+    words = run("train", "--compare", 2, "--verify", 20, "--out", tmp_path / "o", folder=tmp_path)
+    assert "95 %" in words
+    for method in ("nothing", "constant", "rule", "best of the family", "policy"):
+        assert method in words
+    with (tmp_path / "o/comparison.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    (bare,) = (row for row in rows if row["method"] == "nothing")
+    assert float(bare["z"]) == float(bare["nothing"])
+    assert len(rows) == 5  # the second site has a mass
+    notes = load(tmp_path / "o/policy.safetensors").network.notes
+    assert notes["command"] == "rigdda train --algorithm gradient --simulate 0 --seed 0"
+    line = refused("train", "--seed", 1, "--out", tmp_path / "o", folder=tmp_path)
+    assert "seed = 1" in line and "another folder" in line
 
 
 def test_bad_terms_are_one_line(tmp_path: Path) -> None:
     line = refused("train", "--sites", 100_000, folder=tmp_path)
     assert "sites" in line and "100000" in line
+    line = refused("train", "--simulate", 1_000, folder=tmp_path)
+    assert "simulate = 1000" in line
     line = refused("evaluate", "--policy", "none.safetensors", folder=tmp_path)
     assert "none.safetensors" in line
-    assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    "name, content",
-    [
-        ("training.json", b"{"),
-        ("training.json", b"\xff"),
-        ("checkpoint.zip", b"no archive"),
-        ("checkpoint.zip", None),
-    ],
-)
-def test_a_damaged_training_is_one_line(name: str, content: bytes | None, tmp_path: Path) -> None:
-    file = tmp_path / name
-    if content is None:  # sound, but of something else
-        with zipfile.ZipFile(file, "w") as archive:
-            archive.writestr("data", "x")
-    else:
-        file.write_bytes(content)
-    line = refused("train", *SMALL, "--out", ".", folder=tmp_path)
-    assert name in line and "another folder" in line
-    assert list(tmp_path.iterdir()) == [file]
+def test_a_damaged_training_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "training.json").write_bytes(b"{")
+    line = refused("train", "--out", ".", folder=tmp_path)
+    assert "training.json" in line and "another folder" in line
 
 
-@pytest.mark.slow
-def test_a_checkpoint_without_its_terms_is_one_line(
-    trained: tuple[Path, str], tmp_path: Path
-) -> None:
-    (tmp_path / "checkpoint.zip").write_bytes((trained[0] / "checkpoint.zip").read_bytes())
-    line = refused("train", *SMALL, "--out", ".", folder=tmp_path)
-    assert "training.json" in line and "missing" in line and "another folder" in line
+def test_a_network_of_members_gives_the_scores_of_each() -> None:
+    torch = pytest.importorskip("torch")
+    from rigdda.agents.learning import pointer
 
-
-@pytest.mark.slow
-def test_a_checkpoint_cut_off_is_one_line(trained: tuple[Path, str], tmp_path: Path) -> None:
-    for name in ("training.json", "checkpoint.zip"):
-        (tmp_path / name).write_bytes((trained[0] / name).read_bytes())
-    file = tmp_path / "checkpoint.zip"
-    file.write_bytes(file.read_bytes()[:-1000])
-    line = refused("train", *SMALL, "--out", ".", folder=tmp_path)
-    assert "checkpoint.zip" in line and "another folder" in line
-
-
-class Toy(ppo.VecEnv):
-    """Four features, a policy's numbers, and a reward for the first number being 0.8."""
-
-    def __init__(self, copies: int = 16):
-        from gymnasium import spaces
-
-        box = spaces.Box(-np.inf, np.inf, (4,), np.float32)
-        super().__init__(copies, box, spaces.Box(-1.0, 1.0, (SLOTS.size,), np.float32))
-        self.seen = np.zeros((copies, 4), np.float32)
-
-    def reset(self) -> np.ndarray:
-        return self.seen
-
-    def step_async(self, actions: np.ndarray) -> None:
-        self.actions = actions
-
-    def step_wait(self):
-        reward = -np.abs(self.actions[:, 0] - 0.8).astype(np.float32)
-        done = np.ones(self.num_envs, dtype=bool)
-        infos = [{"terminal_observation": seen} for seen in self.seen]
-        return self.seen, reward, done, infos
-
-    def close(self) -> None: ...
-
-    def get_attr(self, attr_name, indices=None):
-        return [None] * self.num_envs
-
-    def set_attr(self, attr_name, value, indices=None) -> None: ...
-
-    def env_method(self, method_name, *args, indices=None, **kwargs):
-        return [None] * self.num_envs
-
-    def env_is_wrapped(self, wrapper_class, indices=None):
-        return [False] * self.num_envs
-
-
-def test_ppo_learns_and_goes_on_from_its_checkpoint(tmp_path: Path) -> None:
-    toy, file = Toy(), tmp_path / "checkpoint.zip"
-    zeros, ones = np.zeros(4, np.float32), np.ones(4, np.float32)
-    model = ppo.learner(toy, 0, tmp_path)
-    seen: list[int] = []
-    ppo.learn(model, 16 * 4 * 3, file, seen.append)
-    before = ppo.export(model, zeros, ones, {})(zeros)[0]
-    kept = ppo.resume(file, toy)
-    assert kept.num_timesteps == 16 * 4 * 3
-    ppo.learn(kept, 16 * 4 * 60, file, seen.append)
-    after = ppo.export(kept, zeros, ones, {})(zeros)[0]
-    assert abs(after - 0.8) < abs(before - 0.8) - 0.05
-    assert seen[-1] == 16 * 4 * 60
-
-
-def test_the_exported_network_says_what_torch_says(tmp_path: Path) -> None:
-    model = ppo.learner(Toy(), 0, tmp_path)
-    mean, scale = np.arange(1.0, 5.0, dtype=np.float32), np.array([2, 1, 0.5, 4], np.float32)
-    made = ppo.export(model, mean, scale, {})
-    for seen in (np.zeros(4, np.float32), np.ones(4, np.float32)):
-        said, _ = model.predict(seen, deterministic=True)
-        np.testing.assert_allclose(made(mean + scale * seen), said, atol=1e-5)
-    assert (made(mean) != made(mean + scale)).any()
-
-
-@pytest.mark.slow
-def test_a_training_that_is_done_is_not_done_again(
-    trained: tuple[Path, str], tmp_path: Path
-) -> None:
-    folder = tmp_path / "o"
-    shutil.copytree(trained[0], folder)
-    before = (folder / "policy.safetensors").read_bytes()
-    seen: list[int] = []
-    training.train(training.Terms(2, 16, 0), folder, lambda done, *_: seen.append(done))
-    assert seen == [] and (folder / "policy.safetensors").read_bytes() == before
-
-
-NAMES = sites.split(training.SPLIT)[:2]
-
-
-@pytest.fixture
-def featured() -> ppo.Featured:
+    members = [pointer.Pointer(FEATURES, seed) for seed in range(3)]
     zeros, ones = np.zeros(FEATURES, np.float32), np.ones(FEATURES, np.float32)
-    return ppo.Featured(ppo.pool(NAMES, training.FIDELITY), zeros, ones)
-
-
-@pytest.mark.slow
-def test_every_copy_of_the_pool_keeps_its_site() -> None:
-    copies = ppo.pool(NAMES, training.FIDELITY)
-    copies.seed(0)
-    first = copies.reset()
-    nothing = np.full((2, SLOTS.size), -1.0)
-    for _ in range(2):
-        second, rewards, done, infos = copies.step(nothing)
-        assert done.all() and not rewards.any()
-        assert [info["site"] for info in infos] == NAMES
-        assert (first["profile"] == second["profile"]).all()
-    assert (first["profile"][0] != first["profile"][1]).any()
-
-
-def test_an_action_of_nothing_builds_what_the_policy_starts_from(featured: ppo.Featured) -> None:
-    assert featured.reset().shape == (2, FEATURES)
-    _, _, _, infos = featured.step(np.zeros((2, SLOTS.size), np.float32))
-    layer = np.zeros((SLOTS.size, FEATURES), np.float32), np.zeros(SLOTS.size, np.float32)
-    zeros, ones = np.zeros(FEATURES, np.float32), np.ones(FEATURES, np.float32)
-    nothing = Network(zeros, ones, [layer], {})
-    for name, info in zip(NAMES, infos, strict=True):
-        said = decide(nothing, training.problem(name))
-        assert [barrier.kind for barrier in info["layout"]] == [barrier.kind for barrier in said]
-        for built, meant in zip(info["layout"], said, strict=True):
-            assert built.x == pytest.approx(meant.x, abs=1e-5)
-
-
-def test_what_is_learnt_from_is_what_the_policy_sees(featured: ppo.Featured) -> None:
-    seen = featured.reset()
-    for name, row in zip(NAMES, seen, strict=True):
-        see = np.clip(training.observed_features(training.problem(name)), -3.0, 3.0)
-        np.testing.assert_allclose(row, see, rtol=1e-6)
-
-
-def test_a_reward_is_what_is_better_than_usual_at_a_site(featured: ppo.Featured) -> None:
-    featured.reset()
-    built = np.zeros((2, SLOTS.size), np.float32)
-    _, first, _, _ = featured.step(built)
-    assert first.tolist() == [0.0, 0.0]
-    usual = featured.usual.copy()
-    _, second, _, _ = featured.step(built)
-    assert featured.usual == pytest.approx(usual + ppo.RECENT * second)
+    made = pointer.export(members, zeros, ones, {})
+    assert isinstance(made, Network) and made.sizes[-1] == 3
+    seen = np.random.default_rng(0).uniform(-1, 1, (4, FEATURES)).astype(np.float32)
+    mask = torch.ones(4, dtype=torch.bool)
+    for k, member in enumerate(members):
+        said = member(torch.tensor(seen), mask).detach().numpy()
+        np.testing.assert_allclose(made(seen)[:, k], said, atol=1e-5)

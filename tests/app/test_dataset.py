@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigdda import BadInput
-from rigdda.agents.policy import FEATURES
+from rigdda.agents.network import WIDTH
 from rigdda.app import cli, dataset
 from rigdda.app.dataset import Recipe
 from rigdda.barriers import from_table
@@ -43,7 +43,7 @@ def test_rows_are_the_outcomes_of_the_releases(folder: Path) -> None:
     assert rows[0]["capital"] == again.cost and rows[0]["annual"] == again.capital
     (place,) = places.to_pylist()
     assert place["site"] == SITE and place["nothing"] == problem.nothing.objective
-    assert len(place["observation"]) == FEATURES
+    assert len(place["observation"]) == WIDTH
 
 
 def test_layouts_differ_and_may_be_built() -> None:

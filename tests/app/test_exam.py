@@ -294,6 +294,15 @@ def test_interquartile_mean_and_its_interval() -> None:
     assert inside >= 85
 
 
+def test_entries_that_cannot_be_told_apart_are_named() -> None:
+    rng = np.random.default_rng(1)
+    site = rng.normal(0.0, 1.0, 24)  # what all entries have in common
+    noise = rng.normal(0.0, 0.02, (3, 24))
+    scores = {"a": site + noise[0], "b": site + noise[1], "c": site + 0.1 + noise[2]}
+    assert ranking.ties(scores) == {"a": ["b"], "b": ["a"], "c": []}
+    assert ranking.ties({"a": site[:1], "b": site[:1] + 1.0}) == {"a": ["b"], "b": ["a"]}
+
+
 @pytest.mark.parametrize(
     ("low", "high", "printed"),
     [(math.nan, math.nan, "0.900"), (0.9, 0.95, "0.900 (0.900 to 0.950)")],

@@ -28,7 +28,7 @@ from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.forecast import Forecast, forecast_seeds, value_network
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.race import forecasts_of, single_barriers
-from rigdda.agents.policy import Network
+from rigdda.agents.network import Network
 from rigdda.envs import DesignProblem
 from rigdda.envs.corridor_environment import CorridorDesign
 
@@ -129,8 +129,8 @@ class Prospect:
         gain = network.layers[0][0].astype(np.float64).ravel() if network.layers else money[:0]
         ascending = bool((np.diff(money) > 0.0).all() and (np.diff(gain) >= 0.0).all())
         if len(money) != len(gain) or len(money) < 2 or not ascending:
-            mend = "name a file that `rigdda train --model corridor` wrote"
-            raise BadInput("prospect", str(path), mend)
+            hint = "name a file that `rigdda train --model corridor` wrote"
+            raise BadInput("prospect", str(path), hint)
         return cls(money, gain)
 
 

@@ -14,7 +14,11 @@ from rigdda import BadInput, check
 DEFAULT = "race"
 """Name of the default designer."""
 
-DESIGNERS = ("cma", "constant", "convex", "pareto", "ppo", "race", "random", "rule", "tpe", "value")
+DESIGNERS = (
+    "cma", "constant", "convex", "pareto", "policy", "ppo", "race", "random", "rule", "tpe",
+    "value",
+)  # fmt: skip
+"""Names of the designers."""
 
 STOPPING = ("race",)
 """Designers whose `design` takes a `precision` and stops when the search gains less than that."""
@@ -31,5 +35,5 @@ def module(name: str) -> ModuleType:
     try:
         return import_module(f"{__name__}.{check.one_of('designer', name, DESIGNERS)}")
     except ModuleNotFoundError as error:
-        mend = f"install {error.name}: pip install 'rigdda[rl]'"
-        raise BadInput("designer", name, mend) from None
+        hint = f"install {error.name}: pip install 'rigdda[rl]'"
+        raise BadInput("designer", name, hint) from None

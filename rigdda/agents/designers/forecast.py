@@ -28,7 +28,7 @@ from rigdda.envs.envelope import largest
 from rigdda.envs.problem import excess
 
 if TYPE_CHECKING:
-    from rigdda.agents.policy import Network
+    from rigdda.agents.network import Network
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -326,6 +326,6 @@ NETWORK_FILE = Path(__file__).parent / "value.safetensors"
 @lru_cache(maxsize=1)
 def value_network() -> Value:
     """Return the value network that ships with the package; the file is read once."""
-    from rigdda.agents.policy import Network
+    from rigdda.agents.network import Network
 
     return Value(Network.load(NETWORK_FILE))

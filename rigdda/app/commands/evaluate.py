@@ -60,8 +60,8 @@ def evaluate(
     evaluations.jsonl.
     """
     from rigdda.agents import designers
+    from rigdda.agents.designers.policy import load, using
     from rigdda.agents.designers.store import Store
-    from rigdda.agents.policy import load, using
     from rigdda.app import contest
     from rigdda.app.reports import tables
 

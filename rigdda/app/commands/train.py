@@ -2,93 +2,122 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from rigdda.agents import limits
 from rigdda.agents.limits import SEED
 from rigdda.app.terminal import (
     WholeNumber,
+    count_option,
     folder_for,
     out_option,
     progress,
     recorded_run,
     seed_option,
+    show,
 )
 
-if TYPE_CHECKING:
-    pass
+TRAINING_SITES = {"policy": 0, "value": 96, "corridor": 12}
+"""Default number of training sites by model; 0: those of the table that ships."""
 
-
-TRAINING_SITES = {"policy": 512, "value": 96, "corridor": 12}
-"""Default number of training sites by model."""
-
-
-EPISODES = 49_152
-"""Default number of episodes of a policy."""
+COMPARISON = "comparison.csv"
+"""File with Z of the policy and of simple rules on each site."""
 
 
 @click.command()
 @click.option("--model", type=click.Choice(tuple(TRAINING_SITES)),
               default="policy", show_default=True,
-              help="A policy trained with PPO, the value network, or the agent for "
-              "corridors.")  # fmt: skip
+              help="A policy, the value network, or the agent for corridors.")  # fmt: skip
 @click.option("--sites", type=WholeNumber(2), metavar="N",
-              help="Number of random sites to train on.  [default: 512 for a policy, 96 for the "
-              "value network, 12 for corridors]")  # fmt: skip
-@click.option("--episodes", type=WholeNumber(0, limits.JOB_RELEASES), metavar="N",
-              help="Number of episodes, for a policy.  [default: 49152]")  # fmt: skip
+              help="Number of random sites to train on.  [default: the table of forecasts of the "
+              "package for a policy, 96 for the value network, 12 for corridors]")  # fmt: skip
+@click.option("--algorithm", type=click.Choice(("gradient", "ppo")), default="gradient",
+              show_default=True, help="Exact policy gradient or PPO, for a policy.")  # fmt: skip
+@click.option("--simulate", type=WholeNumber(0), default=0, show_default=True, metavar="K",
+              help="Number of promising layouts of each site to simulate for a second stage of "
+              "learning, for a policy.")  # fmt: skip
+@click.option("--compare", type=WholeNumber(0), default=6, show_default=True, metavar="N",
+              help="Number of validation sites for the comparison of a policy with simple "
+              "rules.")  # fmt: skip
+@count_option("--verify", 10, 200, "Number of new releases for each layout of the comparison.")
 @seed_option("Seed of all random numbers.", SEED)
 @out_option("train")
-def train(model: str, sites: int | None, episodes: int | None, seed: int, out: Path | None) -> None:
+def train(
+    model: str, sites: int | None, algorithm: str, simulate: int, compare: int, verify: int,
+    seed: int, out: Path | None,
+) -> None:  # fmt: skip
     """Train a network that designs layouts without a search.
 
-    A policy observes the ground, the prices and the rockfall without barriers, and is improved by
-    PPO. Writes policy.safetensors, for `rigdda evaluate --policy`, and logs for TensorBoard. A
-    complete training continues if --episodes is larger than before.
+    A policy chooses a layout from a catalogue of relative layouts. It learns on forecasts of the
+    value network, which takes seconds, and with --simulate also on outcomes. Then its layouts are
+    compared with no barrier, the constant, the rule and the best layout of the family of each site.
+    Writes policy.safetensors, for `rigdda evaluate --policy`, and comparison.csv.
 
     The value network forecasts the remaining risk with any layout from the rockfall without
     barriers. It is trained on simulated layouts of every site, about half a minute each. Writes
     value.safetensors. The one that ships with the package is the prior of the designer `race`.
 
-    The agent for corridors needs an estimate of what a budget saves in the remaining sections. It
+    The agent for corridors needs to know how much money will save in the remaining sections. This
     is computed from forecasts of the value network on every site, about half a minute each. Writes
     prospect.safetensors.
 
     An interrupted training continues where it stopped and gives the same result; the one of the
     agent for corridors starts again. A policy and the value network require the extra `rl`.
     """
-    from rigdda.agents import training, value_training
+    number = sites or TRAINING_SITES[model]
+    if model != "policy" and (simulate or algorithm != "gradient"):
+        raise click.UsageError("--algorithm and --simulate are for --model policy: leave them out")
+    if model == "policy":
+        _policy(number, algorithm, simulate, compare, verify, seed, out)
+    elif model == "value":
+        _value(number, seed, out)
+    else:
+        _corridor(number, seed, out)
+
+
+def _policy(
+    sites: int, algorithm: str, simulate: int, compare: int, verify: int, seed: int,
+    out: Path | None,
+) -> None:  # fmt: skip
+    """Train a policy and compare it with simple rules."""
+    from rigdda.agents import training
+    from rigdda.app.reports import tables, training_table
+
+    terms = training.Terms(sites, algorithm, simulate, seed)
+    folder = folder_for(out, "train", *training.FILES, COMPARISON)
+    with recorded_run(folder), progress(max(sites, compare, training.MEMBERS)) as tick:
+        policy = training.train(terms, folder, tick)
+        rows = training.compare(policy, folder, terms, compare, verify, tick)
+        if rows:
+            tables.write_rows(folder / COMPARISON, [asdict(row) for row in rows])
+    if rows:
+        click.echo(training_table.HEAD)
+        show(training_table.table(rows))
+    click.echo(f"policy.safetensors is in {folder}")
+
+
+def _value(sites: int, seed: int, out: Path | None) -> None:
+    """Train the value network."""
+    from rigdda.agents import value_training
+
+    asked = value_training.ValueTerms(sites, seed)
+    folder = folder_for(out, "train", *value_training.VALUE_FILES)
+    with recorded_run(folder), progress(asked.sites) as tick:
+        value_training.train(asked, folder, tick)
+    click.echo(f"value network of {asked.sites} sites; value.safetensors is in {folder}")
+
+
+def _corridor(sites: int, seed: int, out: Path | None) -> None:
+    """Train the agent for corridors."""
     from rigdda.agents.corridor import agent
 
-    sites = sites or TRAINING_SITES[model]
-    if model != "policy" and episodes is not None:
-        raise click.UsageError("--episodes is for --model policy: leave it out")
-    if model == "corridor":
-        folder = folder_for(out, "train", agent.PROSPECT_FILE.name)
-        with recorded_run(folder), progress(sites) as tick:
-            found = agent.train(sites, seed, folder, tick)
-        most = 100.0 * found.gain[-1]
-        click.echo(
-            f"forecasts on {sites} sites: unlimited money gains {most:.0f} % of the annual cost; "
-            f"{agent.PROSPECT_FILE.name} is in {folder}"
-        )
-        return
-    if model == "value":
-        asked = value_training.ValueTerms(sites, seed)
-        folder = folder_for(out, "train", *value_training.VALUE_FILES)
-        with recorded_run(folder), progress(asked.sites) as tick:
-            value_training.train(asked, folder, tick)
-        click.echo(f"value network of {asked.sites} sites; value.safetensors is in {folder}")
-        return
-    terms = training.Terms(sites, EPISODES if episodes is None else episodes, seed)
-    folder = folder_for(out, "train", *training.TRAINING_FILES)
-    with recorded_run(folder), progress(terms.episodes) as tick:
-        trained = training.train(terms, folder, lambda done: tick(done, "PPO"))
+    folder = folder_for(out, "train", agent.PROSPECT_FILE.name)
+    with recorded_run(folder), progress(sites) as tick:
+        found = agent.train(sites, seed, folder, tick)
+    most = 100.0 * found.gain[-1]
     click.echo(
-        f"mean relative reduction of Z on {terms.beside} sites not used in training: "
-        f"{trained.before:.3f} before the training, {trained.after:.3f} after it; "
-        f"policy.safetensors is in {folder}"
+        f"forecasts on {sites} sites: unlimited money gains {most:.0f} % of the annual cost; "
+        f"{agent.PROSPECT_FILE.name} is in {folder}"
     )

@@ -106,8 +106,8 @@ class ReleaseCounter:
         left = self.budget - self.used
         if releases > left:
             self.refused += 1
-            mend = f"ask for at most the {left:,} that are left of {self.budget:,}"
-            raise BadInput("releases", releases, mend)
+            hint = f"ask for at most the {left:,} that are left of {self.budget:,}"
+            raise BadInput("releases", releases, hint)
         return releases
 
 

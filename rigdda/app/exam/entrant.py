@@ -72,8 +72,8 @@ def load(name: str) -> Entry:
     try:
         found = getattr(importlib.import_module(module), function)
     except (ImportError, AttributeError) as error:
-        mend = f"name a function that can be imported from this folder ({error})"
-        raise BadInput("--entry", name, mend) from None
+        hint = f"name a function that can be imported from this folder ({error})"
+        raise BadInput("--entry", name, hint) from None
     if not callable(found):
         raise BadInput("--entry", name, "name a function that receives a task")
     return found

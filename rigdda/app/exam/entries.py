@@ -70,6 +70,11 @@ def value(task: Task) -> Layout:
     return _search(task, "value")
 
 
+def policy(task: Task) -> Layout:
+    """Build what the policy of the package chooses, from releases without barriers."""
+    return _search(task, "policy")
+
+
 def _search(task: Task, name: str) -> Layout:
     """Return the layout of a designer."""
     if task.left < LEAST_RELEASES:

@@ -87,7 +87,7 @@ class RefusedReply(msgspec.Struct, frozen=True, tag=True):
 
     field: str
     value: str
-    mend: str
+    hint: str
 
 
 AnyReply = BatchReply | CrossingsReply | RefusedReply

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from scipy.stats import trim_mean
 from rigdda.app.exam.scorer import ExamPart, ExamScore
 from rigdda.app.exam.specification import References
 from rigdda.app.reports import pictures, tables
+from rigdda.envs.intervals import student_interval
 from rigdda.rounding import between
 
 if TYPE_CHECKING:
@@ -68,6 +70,26 @@ def interval(values: Floats, strata: Sequence[str], seed: int = 0) -> tuple[floa
     means = trim_mean(drawn, 0.25, axis=1)
     low, high = np.quantile(means, [0.025, 0.975]).tolist()
     return low, high
+
+
+def ties(scores: Mapping[str, Floats]) -> dict[str, list[str]]:
+    """Return for each entry the others that it cannot be told apart from.
+
+    Two entries are told apart if the 95 % interval of the mean of their differences over the tasks
+    (Student's t) does not contain 0.
+
+    Parameters
+    ----------
+    scores : mapping of str to (n,) array
+        Scores of each entry on the same tasks.
+    """
+    found: dict[str, list[str]] = {name: [] for name in scores}
+    for one, other in itertools.combinations(scores, 2):
+        low, high = student_interval(scores[one] - scores[other])
+        if low <= 0.0 <= high:
+            found[one].append(other)
+            found[other].append(one)
+    return found
 
 
 def family(name: str) -> str:

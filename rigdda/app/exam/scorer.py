@@ -149,8 +149,8 @@ def check_references(asked: ExamPart, references: References) -> None:
     for order in asked.orders(asked.budgets[0]):
         anchor = references.anchors.get(order.name)
         if anchor is None or not anchor.reference < min(anchor.random, anchor.nothing):
-            mend = "record one that is better: python -m experiments.exam_reference"
-            raise BadInput("references", order.name, mend)
+            hint = "record one that is better: python -m experiments.exam_reference"
+            raise BadInput("references", order.name, hint)
 
 
 class Submission(msgspec.Struct, frozen=True):
@@ -303,9 +303,9 @@ class Scorer:
             {"run": msgspec.json.encode([__version__, *own]).decode()},
         )
         if file.is_file() and _decoded(file, dict[str, str]) != identity:
-            mend = "it contains an exam of another entry, source file, seed or version: "
-            mend += "name another folder"
-            raise BadInput("--out", str(self.folder), mend)
+            hint = "it contains an exam of another entry, source file, seed or version: "
+            hint += "name another folder"
+            raise BadInput("--out", str(self.folder), hint)
         with atomic(file) as fresh:
             fresh.write_bytes(msgspec.json.encode(identity))
         known = self.folder / SUBMISSIONS
@@ -357,11 +357,11 @@ class Scorer:
                 else:
                     return _submission(order, problems, counter, request)
         except (EOFError, ConnectionError, OSError):
-            mend = f"its process ended on {order.name}: return a layout instead"
-            raise BadInput("--entry", self.entry, mend) from None
+            hint = f"its process ended on {order.name}: return a layout instead"
+            raise BadInput("--entry", self.entry, hint) from None
         except msgspec.MsgspecError as error:
-            mend = f"it sent an unknown request: use the methods of the task ({error})"
-            raise BadInput("--entry", self.entry, mend) from None
+            hint = f"it sent an unknown request: use the methods of the task ({error})"
+            raise BadInput("--entry", self.entry, hint) from None
 
     def seeds(self, name: str, budget: int, chosen: int = 0) -> list[int]:
         """Return the seeds of the verification of a task.
@@ -438,8 +438,8 @@ def _submission(
         for at, problem, own in zip(order.lengths, problems, request.layouts, strict=True):
             cost += at * problem.site.capital(problem.check(from_tables(own)))
         if order.money is not None and cost > order.money * (1.0 + TOLERANCE):
-            mend = f"spend at most {order.money:,.0f} EUR"
-            raise BadInput("layouts", f"{cost:,.0f} EUR", mend)
+            hint = f"spend at most {order.money:,.0f} EUR"
+            raise BadInput("layouts", f"{cost:,.0f} EUR", hint)
         layouts = request.layouts
     except (BadInput, TypeError) as bad:
         counter.flag(f"submitted what cannot be built: {' '.join(str(bad).split())}")
@@ -459,8 +459,8 @@ def _decoded(file: Path, of: type[Any]) -> Any:
     try:
         return msgspec.json.decode(file.read_bytes(), type=of)
     except msgspec.MsgspecError as error:
-        mend = f"this is damaged: remove the exam in its folder, or name another folder ({error})"
-        raise BadInput("exam", str(file), mend) from None
+        hint = f"this is damaged: remove the exam in its folder, or name another folder ({error})"
+        raise BadInput("exam", str(file), hint) from None
 
 
 @contextmanager
@@ -496,9 +496,9 @@ def source_hash_of(entry: str) -> str:
     for i, _ in enumerate(names):
         spec = importlib.machinery.PathFinder.find_spec(".".join(names[: i + 1]), places)
         if spec is None:
-            mend = "name package.module:function of a module in this folder or an installed one"
-            mend += ", without .py" if entry.partition(":")[0].endswith(".py") else ""
-            raise BadInput("--entry", entry, mend)
+            hint = "name package.module:function of a module in this folder or an installed one"
+            hint += ", without .py" if entry.partition(":")[0].endswith(".py") else ""
+            raise BadInput("--entry", entry, hint)
         places = spec.submodule_search_locations
     file = Path(spec.origin or "") if spec is not None else Path()
     return hashlib.sha256(file.read_bytes()).hexdigest()[:16] if file.is_file() else ""

@@ -133,8 +133,8 @@ def load(path: str | os.PathLike[str] | None = None) -> Specification:
         raise BadInput("budgets", found.budgets, "give at least one number of releases from 0")
     for corridor in found.corridors:
         if len(corridor.sites) != len(corridor.lengths):
-            mend = f"give {len(corridor.sites)}, one for each site"
-            raise BadInput("corridors.lengths", corridor.lengths, mend)
+            hint = f"give {len(corridor.sites)}, one for each site"
+            raise BadInput("corridors.lengths", corridor.lengths, hint)
     return found
 
 
@@ -156,10 +156,10 @@ def references(
         If the file is missing or invalid.
     """
     file = file_of_references(specification, path)
-    mend = "record it: python -m experiments.exam_reference --spec FILE"
+    hint = "record it: python -m experiments.exam_reference --spec FILE"
     try:
         return msgspec.json.decode(file.read_bytes(), type=References)
     except OSError as error:
-        raise BadInput("references", str(file), f"{mend} ({error.strerror})") from None
+        raise BadInput("references", str(file), f"{hint} ({error.strerror})") from None
     except msgspec.MsgspecError as error:
-        raise BadInput("references", str(file), f"{mend} ({error})") from None
+        raise BadInput("references", str(file), f"{hint} ({error})") from None

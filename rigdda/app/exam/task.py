@@ -59,7 +59,7 @@ def _reply(line: Line, request: Request) -> BatchReply | CrossingsReply:
     """
     found = line.ask(request)
     if isinstance(found, RefusedReply):
-        raise BadInput(found.field, found.value, found.mend)
+        raise BadInput(found.field, found.value, found.hint)
     return found
 
 
@@ -227,8 +227,8 @@ class Task:
 
     def _afford(self, releases: int) -> None:
         if releases > self.left:
-            mend = f"ask for at most the {self.left:,} that are left of {self.budget:,}"
-            raise BadInput("releases", releases, mend)
+            hint = f"ask for at most the {self.left:,} that are left of {self.budget:,}"
+            raise BadInput("releases", releases, hint)
 
     def _batch(self, request: EvaluateRequest | SampleRequest, count: int) -> StoredEvaluation:
         found = _reply(self._line, request)

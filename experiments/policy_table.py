@@ -1,0 +1,111 @@
+"""Policies without a search: the acceptance table of the trained policy.
+
+`python -m experiments.policy_table [--quick] [--out DIR]`. On sites of the test split, which
+decided nothing, every method builds one layout without simulating any layout: nothing, the
+constant, the engineering rule, the best layout of the family of the site (chosen on training sites
+by forecasts, told the family), the least forecast Z of the value network over all single barriers
+and pairs (`value`), the least forecast of the catalogue (`catalogue`), and the policy that ships.
+The layouts are verified on the same fresh releases. Sites with an event of 100 blocks or more are
+left out.
+
+Writes policy_table.csv, one row per layout. An interrupted run is resumed. Judged by the lower end
+of the 95 % interval of the gain of the policy over the best of the constant, the rule and the
+family, and, in the note, by the distance to the value network.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.no_search import forecast, relative
+from experiments.script import Number, interval, main, say, write
+from experiments.search_gain import blocks, load
+from rigdda import MECHANICS, Layout, sites
+from rigdda.agents.designers import policy
+from rigdda.agents.designers.protocol import verify
+from rigdda.agents.designers.store import Store
+from rigdda.agents.learning import forecasts
+from rigdda.agents.training import MASS, methods
+from rigdda.barriers import describe
+from rigdda.envs import DesignProblem, forecast_table
+
+SITES, QUICK_SITES = 18, 2
+RELEASES, QUICK_RELEASES = 400, 60
+FRESH = 3
+"""Seed of the releases, which nothing else draws."""
+SIMPLE = ("constant", "rule", "best of the family")
+"""Methods that the policy must improve on."""
+
+
+def layouts(problem: DesignProblem) -> dict[str, Layout]:
+    """Return the layout of every method."""
+    trained = policy.load()
+    found = forecasts.of_site(problem, trained.layouts)
+    best = found.layouts[int(np.nanargmin(found.z))]
+    others = {"value": forecast(problem, None), "catalogue": best or ()}
+    return methods(trained, forecast_table.load(), problem) | others
+
+
+def study(problem: DesignProblem, releases: int) -> list[dict[str, Any]]:
+    """Return the rows of a site."""
+    say(problem.site.name)
+    store, found = Store(), []
+    notes = policy.load().network.notes
+    for name, layout in layouts(problem).items():
+        e = verify(problem, layout, releases, FRESH, store)
+        found.append({
+            "site": problem.site.name, "method": name, "z": e.objective, "z_low": e.ci[0],
+            "z_high": e.ci[1], "z_nothing": problem.nothing.objective, "releases": releases,
+            "mechanics": MECHANICS, "policy": notes["command"], "table": notes["table"],
+            "layout": "; ".join(map(describe, layout)),
+        })  # fmt: skip
+    return found
+
+
+def problems(count: int) -> list[DesignProblem]:
+    """Return the problems of the first test sites without large masses."""
+    found: list[DesignProblem] = []
+    for name in sites.split("test"):
+        if len(found) < count:
+            problem = forecasts.problem(name)
+            found += [problem] if blocks(problem) < MASS else []
+    return found
+
+
+def differences(rows: Sequence[Any], others: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return how far the policy is ahead of each method: mean and half width [-]."""
+    own = relative(rows, "policy")
+    return {other: interval(relative(rows, other) - own) for other in others}
+
+
+def run(quick: bool, out: Path) -> Number:
+    """Write policy_table.csv."""
+    path, releases = out / "policy_table.csv", QUICK_RELEASES if quick else RELEASES
+    table = policy.load().network.notes["table"]
+    rows: list[Any] = [
+        row for row in load(path) if row["table"] == table and row["releases"] == str(releases)
+    ]
+    known = {row["site"] for row in rows}
+    for problem in problems(QUICK_SITES if quick else SITES):
+        if problem.site.name not in known:
+            rows += study(problem, releases)
+            write(path, rows)
+    names = list(dict.fromkeys(row["method"] for row in rows))
+    lines = []
+    for name, (mean, half) in differences(rows, names).items():
+        z = float(relative(rows, name).mean())
+        apart = "" if name == "policy" else f", policy ahead by {mean:.3f} +- {half:.3f}"
+        lines.append(f"{name}: {z:.3f}{apart}")
+    least = min(mean - half for mean, half in differences(rows, SIMPLE).values())
+    what = "gain of the policy over constant, rule and family over Z without barriers, lower end"
+    note = f"{len(relative(rows, 'policy'))} sites\n" + "\n".join(lines)
+    return Number(what, least, low=-math.inf if quick else 0.0, note=note)
+
+
+if __name__ == "__main__":
+    main(run)

@@ -1,0 +1,76 @@
+"""Exact policy gradient: gradient ascent on the expected reward of a policy over a table.
+
+An episode of `rigdda/BarrierForecast-v0` has one step, and a table contains the reward of every
+layout on every site. The expected reward of a policy pi is therefore a sum,
+
+    J = mean over sites s of sum over layouts a of pi(a | s) r(s, a),
+
+of which the gradient needs no samples, no baseline and no critic. The whole algorithm is in
+`learn`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+
+from rigdda.agents.learning.pointer import Pointer
+
+CLONE, STEPS = 200, 400
+"""Number of steps of imitating the forecasts, and of ascent."""
+TEMPERATURE = 0.05
+"""Temperature of the forecast probabilities that are imitated first [-]."""
+RATE, DECAY, JITTER, ENTROPY = 3e-3, 0.01, 0.1, 0.01
+"""Learning rate, which falls linearly to 0, weight decay, standard deviation of the noise added to
+scaled features, and weight of the entropy."""
+
+
+def learn(
+    policy: Pointer,
+    features: torch.Tensor,
+    mask: torch.Tensor,
+    reward: torch.Tensor,
+    seed: int,
+    tick: Callable[[], None],
+    clone: bool = True,
+) -> None:
+    """Train a policy on a table.
+
+    Parameters
+    ----------
+    policy : Pointer
+        The policy, which is changed.
+    features : (S, A, F) tensor
+        Scaled features.
+    mask : (S, A) tensor of bool
+        Layouts that can be built.
+    reward : (S, A) tensor
+        Rewards; entries outside the mask are not used.
+    seed : int
+        Seed of the noise.
+    tick : callable
+        Called after every step.
+    clone : bool
+        Whether the policy first imitates a softmax of the rewards. This begins with a policy that
+        knows good layouts on every site and prefers none of them too early.
+    """
+    generator = torch.Generator().manual_seed(seed)
+    optimiser = torch.optim.AdamW(policy.parameters(), lr=RATE, weight_decay=DECAY)
+    wanted = (reward / TEMPERATURE).masked_fill(~mask, -torch.inf).softmax(dim=1)
+    total = STEPS + CLONE * clone
+    for step in range(total):
+        optimiser.param_groups[0]["lr"] = RATE * (1.0 - step / total)
+        noise = JITTER * torch.randn(features.shape, generator=generator)
+        logp = policy(features + noise, mask).log_softmax(dim=1).masked_fill(~mask, 0.0)
+        chance = logp.exp() * mask
+        if clone and step < CLONE:
+            loss = -(wanted * logp).sum(dim=1).mean()
+        else:
+            expected = (chance * reward).sum(dim=1).mean()
+            entropy = -(chance * logp).sum(dim=1).mean()
+            loss = -expected - ENTROPY * entropy
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        tick()

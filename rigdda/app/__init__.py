@@ -1,0 +1,1 @@
+"""Applications of the library: the command line, reports and the page in the browser."""

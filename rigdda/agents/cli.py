@@ -41,6 +41,7 @@ from rigdda.agents.terminal import (
     seed_option,
     show,
 )
+from rigdda.app.page.command import open_page
 
 if TYPE_CHECKING:
     from rigdda.agents.design_study import ComparedLayouts, DesignStudy
@@ -104,6 +105,9 @@ def cli(context: click.Context) -> None:
     """Simulate rockfall on a slope, design barriers and replay releases."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
+
+
+cli.add_command(open_page)
 
 
 @cli.command()

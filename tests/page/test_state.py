@@ -176,7 +176,8 @@ def test_a_site_file_of_another_name_has_a_folder_of_its_own(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("path", "value"), [(("sources", 9, "band"), [1.0, 2.0]), (("name", "x"), 1.0), (("road", 0), 1)]
+    ("path", "value"),
+    [(("sources", 9, "band"), [1.0, 2.0]), (("name", "x"), 1.0), (("road", 0), 1)],
 )
 def test_an_edit_of_what_is_not_there_names_it(path, value):
     with pytest.raises(BadInput, match=path[0]):

@@ -126,6 +126,6 @@ def choice(
 def button(label: str, do: Callable[[], None], primary: bool = False, **more: Any) -> Any:
     """Return a button."""
     kind = "primary" if primary else "default"
-    found = pn.widgets.Button(name=label, button_type=kind, margin=(4, 8), **more)
+    found = pn.widgets.Button(name=label, button_type=kind, **({"margin": (4, 8)} | more))
     found.on_click(lambda _: do())
     return found

@@ -195,6 +195,8 @@ class Live:
         self.figures: Figures | None = None
         self.revision = 0
         self._known = _Known()
+        self._ready: dict[Layout, Figures] = {}
+        self._ready_site: Site | None = None
         self._asked: tuple[Site, Layout] | None = None
         self._generation = 0
         self._wake = threading.Condition()
@@ -209,6 +211,11 @@ class Live:
                 return
             self._asked, self._generation = (site, layout), self._generation + 1
             self._wake.notify_all()
+
+    def known(self, site: Site, layout: Layout) -> Figures | None:
+        """Return the figures of a layout that was asked for earlier, if they are remembered."""
+        with self._wake:
+            return self._ready.get(layout) if self._ready_site == site else None
 
     def close(self) -> None:
         """End the thread when it has computed its present releases."""
@@ -239,6 +246,10 @@ class Live:
         with self._wake:
             if generation == self._generation:
                 self.figures, self.revision = figures, self.revision + 1
+                if figures.costs is not None and self._asked is not None:
+                    if self._ready_site != self._asked[0]:
+                        self._ready, self._ready_site = {}, self._asked[0]
+                    self._ready[figures.layout] = figures
 
     def _left(self, generation: int) -> bool:
         return generation != self._generation

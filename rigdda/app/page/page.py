@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import html
+import os
+import shlex
 from collections.abc import Callable
 from typing import Any, Protocol
 
 import panel as pn
+import tomli_w
 
 from rigdda import BadInput, Error
 from rigdda.app.page.barriers_tab import BarriersTab
 from rigdda.app.page.falls_tab import FallsTab
-from rigdda.app.page.forms import button, paragraph
-from rigdda.app.page.live import Live
+from rigdda.app.page.forms import button
+from rigdda.app.page.live import Live, study_table
 from rigdda.app.page.slope_tab import SlopeTab
-from rigdda.app.page.state import Conflict, Project
+from rigdda.app.page.state import LAYOUT, Conflict, Project
 from rigdda.app.page.theme import Theme
+from rigdda.files import atomic
+
+STUDY = "study.toml"
+"""File of the study that computes the figures of the page."""
 
 TICK = 100
 """Milliseconds between two looks at what has changed."""
@@ -36,6 +43,27 @@ class Workspace:
     def __init__(self, project: Project):
         self.project = project
         self.live = Live()
+        self._study = ""
+
+    @property
+    def study_command(self) -> str:
+        """The command that computes the figures of the layout; its file is written before it."""
+        folder = self.project.folder
+        file = shlex.quote(str(folder / STUDY))
+        return f"rigdda study {file} --seed 0 --out {shlex.quote(str(folder / 'study'))}"
+
+    def write_study(self) -> None:
+        """Write the study file of the figures that are known, if it has changed."""
+        found, project = self.live.figures, self.project
+        if found is None or not found.releases or found.layout != project.layout:
+            return
+        site = os.path.relpath(project.where.site, project.folder)
+        table = study_table(site, found.layout, LAYOUT, found.releases)
+        text = tomli_w.dumps(table)
+        if text != self._study:
+            with atomic(project.folder / STUDY) as part:
+                part.write_text(text, encoding="utf-8")
+            self._study = text
 
     def __enter__(self) -> Workspace:
         return self
@@ -154,6 +182,7 @@ class Page:
                 self._reread.visible = self._keep.visible = True
         if self._seen != self.project.revision:
             self._refresh()
+        self.workspace.write_study()
         self.active.tick()
 
     def _refresh(self) -> None:
@@ -173,6 +202,3 @@ class Page:
         if project.has_site:
             self.workspace.live.ask(project.site, project.layout)
         self.active.show()
-
-
-__all__ = ["Page", "Tab", "Workspace", "paragraph"]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import panel as pn
-from bokeh.models import ColumnDataSource, PointDrawTool
+from bokeh.models import ColumnDataSource, HoverTool, PointDrawTool
 
 from rigdda import BadInput, Site
 from rigdda.agents import new_site, site_check
@@ -133,8 +133,6 @@ class SlopeTab:
         drag = PointDrawTool(renderers=[places, points], add=False, description="drag the handles")
         plot.add_tools(drag)
         plot.toolbar.active_drag = drag
-        from bokeh.models import HoverTool
-
         plot.add_tools(
             HoverTool(renderers=[places], tooltips=[("", "@words"), ("chainage", "@x{0.00} metres")],
                       description="names of the handles")

@@ -186,9 +186,8 @@ class BarriersTab:
                 if isinstance(getattr(barrier, field.name), int | float):
                     label = in_words(field.name, field.unit)
                     inputs.append(self._input(i, field.name, label, 150))
-            head = pn.pane.HTML(f"<b>{html.escape(words)}</b>", width=110, margin=(22, 8))
-            remove = button("Remove", partial(self._remove, i), width=80)
-            remove.margin = (20, 8)
+            head = pn.pane.HTML(f"<b>{html.escape(words)}</b>", width=100, margin=(22, 8))
+            remove = button("Remove", partial(self._remove, i), width=80, margin=(18, 8))
             rows.append(pn.FlexBox(head, *inputs, remove, sizing_mode="stretch_width"))
         self._forms[:] = rows
 
@@ -237,7 +236,7 @@ class BarriersTab:
         self._rules.object = _rules(found, self.theme.bad)
         road = self.project.site.road.start
         self._figures.object = figures_html(found, self.theme.bad, self.theme.quiet) + "".join(
-            paragraph(f"{words}: {clear:.2f} metres clear of the road when it is deflected")
+            paragraph(f"{words}: {clear + 0.0:.2f} metres clear of the road when deflected")
             for words, clear in clearances(found.layout, road)
         )
         command = self.page.workspace.study_command
@@ -400,4 +399,4 @@ def _checks(found: Figures, bad: str) -> str:
 
 def clearances(layout: Layout, road: float) -> list[tuple[str, float]]:
     """Return the label of each barrier that deflects, and its clear distance from the road [m]."""
-    return [(b.label, road - b.end - b.deflection) for b in layout if b.deflection > 0.0]
+    return [(b.label, round(road - b.end - b.deflection, 6)) for b in layout if b.deflection > 0.0]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import panel as pn
-from bokeh.models import ColumnDataSource, HoverTool, PointDrawTool, TapTool
+from bokeh.models import ColumnDataSource, HoverTool, PointDrawTool, Range1d, TapTool
 from bokeh.plotting import figure
 
 import rigdda
@@ -111,9 +111,9 @@ class FallsTab:
         self._legend = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._shares = pn.pane.HTML("", width=WIDE - 20)
         self._collector = pn.pane.HTML("", width=WIDE - 20)
-        self._station = pn.widgets.FloatInput(name="Collector at chainage [metres]", width=200)
+        self._station = pn.widgets.FloatInput(name="Collector at chainage [metres]", width=190)
         labels = {in_words(QUANTITIES[q].words, QUANTITIES[q].unit): q for q in COLLECTED}
-        self._what = pn.widgets.Select(name="Quantity", options=labels, width=200)
+        self._what = pn.widgets.Select(name="Quantity", options=labels, width=190)
         self._command = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._envelope = ColumnDataSource({"x": [], "energy": [], "height": []})
         self._bars = ColumnDataSource({"left": [], "right": [], "top": []})
@@ -220,9 +220,10 @@ class FallsTab:
 
     def _small(self, title: str, x: str, y: str, x_range: Any) -> Any:
         """Return a small figure."""
-        more = {} if x_range is None else {"x_range": x_range}
         plot = figure(height=190, sizing_mode="stretch_width", tools="", title=title,
-                      x_axis_label=x, y_axis_label=y, toolbar_location=None, **more)  # fmt: skip
+                      x_axis_label=x, y_axis_label=y, toolbar_location=None, visible=False,
+                      x_range=Range1d(0, 1) if x_range is None else x_range,
+                      y_range=Range1d(0, 1))  # fmt: skip
         plot.title.text_color = self.theme.text
         plot.title.text_font_style = "normal"
         plain_axes(plot, self.theme)
@@ -238,6 +239,8 @@ class FallsTab:
         for source in (self._envelope, self._bars, self._curve, self._block, self._hits,
                        self._track):  # fmt: skip
             source.data = {name: [] for name in source.data}
+        for plot in (self._envelopes, self._histogram, self._tracks):
+            plot.visible = False
         self._shares.object = self._collector.object = self._rerun.object = ""
         self._status.object = paragraph("Nothing is released yet.")
         self._time.visible = self._play.visible = False
@@ -372,6 +375,10 @@ class FallsTab:
             "energy": [r["q95"] for r in rows],
             "height": [r["q95"] for r in tall],
         }
+        seen = [r["q95"] for r in rows if np.isfinite(r["q95"])]
+        self._envelopes.visible = bool(seen)
+        if seen:
+            _fit(self._envelopes, None, seen)
 
     def _show_collector(self) -> None:
         if self._shown is None or self._shown.found is None:
@@ -388,6 +395,8 @@ class FallsTab:
             self._bars.data = {"left": edges[:-1], "right": edges[1:], "top": counts}
             share = np.arange(1, len(values) + 1) / len(values) * counts.max()
             self._curve.data = {"x": values, "y": share}
+            _fit(self._histogram, edges, counts)
+        self._histogram.visible = bool(len(values))
         row = next(r for r in self._shown.rows if r["quantity"] == name)
         rows = [
             (words, shown(row[q]), f"{shown(row[f'{q}_low'])} to {shown(row[f'{q}_high'])}")
@@ -438,6 +447,8 @@ class FallsTab:
         self._track.data = {
             "x": fall.x, "energy": fall.energy, "height": fall.y - np.array(ground),
         }  # fmt: skip
+        _fit(self._tracks, fall.x, fall.energy)
+        self._tracks.visible = True
         self._time.end = float(self._run.times[-1])
         self._time.value = 0.0
         self._time.visible = self._play.visible = True
@@ -466,3 +477,11 @@ class FallsTab:
             xs.append(x + cos * arm[:, 0] - sin * arm[:, 1])
             ys.append(y + sin * arm[:, 0] + cos * arm[:, 1])
         self._block.data = {"xs": xs, "ys": ys}
+
+
+def _fit(plot: Any, x: Any, y: Any) -> None:
+    """Fit the axes of a figure to values; without x its axis is that of another figure."""
+    if x is not None:
+        margin = 0.02 * (float(np.max(x) - np.min(x)) or 1.0)
+        plot.x_range.start, plot.x_range.end = float(np.min(x)) - margin, float(np.max(x)) + margin
+    plot.y_range.start, plot.y_range.end = 0.0, 1.08 * (float(np.nanmax(y)) or 1.0)

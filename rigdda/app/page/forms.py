@@ -76,13 +76,21 @@ class Bound:
         Function that returns the value to show.
     write : callable
         Function of the new value; it shows errors itself.
+    parameter : str
+        Parameter of the widget that changes when the user has chosen a value.
     """
 
-    def __init__(self, widget: Any, get: Callable[[], Any], write: Callable[[Any], None]):
+    def __init__(
+        self,
+        widget: Any,
+        get: Callable[[], Any],
+        write: Callable[[Any], None],
+        parameter: str = "value",
+    ):
         self.widget, self._get, self._write = widget, get, write
         self._showing = False
         self.refresh()
-        widget.param.watch(self._changed, "value")
+        widget.param.watch(self._changed, parameter)
 
     def refresh(self) -> None:
         """Show the value of the project."""

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 import rigdda
@@ -21,10 +22,11 @@ from rigdda import Error, Layout, Outcome, Site
 from rigdda.agents.barrier_checks import LayoutChecks, check_layout
 from rigdda.agents.reports import study_report
 from rigdda.agents.reports.study_report import StudiedLayout, StudyResults
+from rigdda.app.page.placing import kinds_for
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem
 from rigdda.envs.cost import Account, account, learn
-from rigdda.envs.outcome_cache import fingerprint
+from rigdda.envs.outcome_cache import release_key
 
 NOTHING, CURRENT = "without it", "layout"
 """Names of the two layouts of a study of the page."""
@@ -159,12 +161,11 @@ class _Known:
 
     key: bytes = b""
     outcomes: dict[Layout, Outcomes] = field(default_factory=dict)
-    checks: dict[Layout, LayoutChecks | str] = field(default_factory=dict)
 
     def of(self, site: Site, layout: Layout) -> Outcomes:
-        key = fingerprint(site)
+        key = release_key(site) + msgspec.json.encode(site.existing)
         if key != self.key:
-            self.key, self.outcomes, self.checks = key, {}, {}
+            self.key, self.outcomes = key, {}
         found = self.outcomes.pop(layout, None) or {name: [] for name in site.event_names}
         self.outcomes[layout] = found
         others = [one for one in self.outcomes if one]  # the bare slope is never forgotten
@@ -278,13 +279,10 @@ class Live:
                 return
         self._show(generation, shown._replace(doing=""))
 
-    def _checked(self, site: Site, layout: Layout) -> LayoutChecks:
-        known = self._known.checks
-        if layout not in known:
-            known[layout] = check_layout(DesignProblem(site, max_barriers=MOST_BARRIERS), layout)
-        found = known[layout]
-        assert isinstance(found, LayoutChecks)
-        return found
+    @staticmethod
+    def _checked(site: Site, layout: Layout) -> LayoutChecks:
+        problem = DesignProblem(site, max_barriers=MOST_BARRIERS, kinds=kinds_for(site))
+        return check_layout(problem, layout)
 
     def _fill(
         self, site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Outcomes], count: int

@@ -6,6 +6,7 @@ import html
 import os
 import shlex
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Protocol
 
 import panel as pn
@@ -13,9 +14,12 @@ import tomli_w
 
 from rigdda import BadInput, Error
 from rigdda.app.page.barriers_tab import BarriersTab
+from rigdda.app.page.decide_tab import DecideTab
 from rigdda.app.page.falls_tab import FallsTab
 from rigdda.app.page.forms import button
+from rigdda.app.page.jobs import Job
 from rigdda.app.page.live import Live, study_table
+from rigdda.app.page.report_tab import ReportTab
 from rigdda.app.page.slope_tab import SlopeTab
 from rigdda.app.page.state import LAYOUT, Conflict, Project
 from rigdda.app.page.theme import Theme
@@ -43,14 +47,37 @@ class Workspace:
     def __init__(self, project: Project):
         self.project = project
         self.live = Live()
+        self.search = Job(project.folder, "search")
+        self.study = Job(project.folder, "study")
+        self.report = Job(project.folder, "report")
         self._study = ""
 
     @property
+    def study_file(self) -> Path:
+        """The study file of the figures of the layout."""
+        return self.project.folder / STUDY
+
+    @property
+    def study_arguments(self) -> list[str]:
+        """Arguments of the command that computes the figures of the layout."""
+        out = self.project.folder / "study"
+        return ["study", str(self.study_file), "--seed", "0", "--out", str(out)]
+
+    @property
     def study_command(self) -> str:
-        """The command that computes the figures of the layout; its file is written before it."""
-        folder = self.project.folder
-        file = shlex.quote(str(folder / STUDY))
-        return f"rigdda study {file} --seed 0 --out {shlex.quote(str(folder / 'study'))}"
+        """The command that computes the figures of the layout."""
+        return shlex.join(["rigdda", *self.study_arguments])
+
+    @property
+    def report_folder(self) -> Path:
+        """The folder of the report."""
+        return self.project.folder / "report"
+
+    @property
+    def design_folder(self) -> Path | None:
+        """The results folder of the last search; None before the first."""
+        known = self.search.arguments
+        return Path(known[known.index("--out") + 1]) if "--out" in known else None
 
     def write_study(self) -> None:
         """Write the study file of the figures that are known, if it has changed."""
@@ -61,7 +88,7 @@ class Workspace:
         table = study_table(site, found.layout, LAYOUT, found.releases)
         text = tomli_w.dumps(table)
         if text != self._study:
-            with atomic(project.folder / STUDY) as part:
+            with atomic(self.study_file) as part:
                 part.write_text(text, encoding="utf-8")
             self._study = text
 
@@ -70,6 +97,8 @@ class Workspace:
 
     def __exit__(self, *_: object) -> None:
         self.live.close()
+        for job in (self.search, self.study, self.report):
+            job.close()
 
 
 class Tab(Protocol):
@@ -83,6 +112,10 @@ class Tab(Protocol):
 
     def tick(self) -> None:
         """Show what has been computed meanwhile."""
+
+
+TABS = (SlopeTab, FallsTab, BarriersTab, DecideTab, ReportTab)
+"""The tabs in the order of use."""
 
 
 class Page:
@@ -106,7 +139,7 @@ class Page:
         self._redo = button("Redo", lambda: self.act(self.project.redo), width=90)
         self._reread = button("Read the file again", self._read_again, visible=False)
         self._keep = button("Keep what the page shows", self._keep_mine, visible=False)
-        self.tabs: list[Tab] = [kind(self) for kind in (SlopeTab, FallsTab, BarriersTab)]
+        self.tabs: list[Tab] = [kind(self) for kind in TABS]
         self._tabs = pn.Tabs(
             *((tab.title, tab.panel) for tab in self.tabs), sizing_mode="stretch_width"
         )

@@ -16,9 +16,6 @@ from rigdda.fields import Described, described
 STEP = 0.1
 """Dragged chainages and lengths are whole multiples of this [m]."""
 
-HIDDEN = ("x", "capacity", "elongation", "option")
-"""Fields of barriers that the forms do not show: they follow from others or are not edited."""
-
 
 class Grip(NamedTuple):
     """A handle of a barrier in the section."""
@@ -113,7 +110,8 @@ def with_field(barrier: Barrier, field: str, value: Any) -> Barrier:
 
 def fields_of(barrier: Barrier) -> list[Described]:
     """Return the fields of a barrier that a form shows, other than its place."""
-    return [field for field in described(type(barrier)) if field.name not in HIDDEN]
+    names = {length.field for length in barrier.lengths} | {"energy_class"}
+    return [field for field in described(type(barrier)) if field.name in names]
 
 
 def grips(site: Site, layout: Layout) -> list[Grip]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import panel as pn
 from tornado.httputil import HTTPHeaders, HTTPServerRequest
-from tornado.web import OutputTransform
+from tornado.web import OutputTransform, StaticFileHandler
 
 from rigdda import BadInput
 from rigdda.app.page import theme
@@ -84,6 +84,9 @@ def serve(project: Project, port: int | None, browser: bool, say: Callable[[str]
             {"/": lambda: _session(workspace)},
             address=HOST, port=at, prefix=f"/{token}", show=False, start=False, threaded=False,
             websocket_origin=[f"{HOST}:{at}", f"localhost:{at}"], title="rigdda", verbose=False,
+            extra_patterns=[
+                ("/report/(.*)", StaticFileHandler, {"path": str(workspace.report_folder)})
+            ],
             check_unused_sessions_milliseconds=5000, unused_session_lifetime_milliseconds=10000,
         )  # fmt: skip
         hosts = frozenset({f"{HOST}:{at}", f"localhost:{at}"})

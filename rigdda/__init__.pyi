@@ -36,6 +36,7 @@ from .model.surface import Surface
 from .model.terrain import Terrain
 from .model.traffic import Toll, Traffic
 from .releases import release, release_many, release_outcome
+from .trajectory import Trajectories, trajectories, trajectory_parts
 
 MECHANICS: str
 __version__: str
@@ -83,6 +84,7 @@ __all__ = [
     "Terrain",
     "Toll",
     "Traffic",
+    "Trajectories",
     "Wall",
     "grounds",
     "limit_equilibrium",
@@ -94,4 +96,6 @@ __all__ = [
     "save_layout",
     "simulate_many",
     "sites",
+    "trajectories",
+    "trajectory_parts",
 ]

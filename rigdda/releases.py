@@ -29,6 +29,7 @@ from rigdda.barriers import (
     standing,
 )
 from rigdda.barriers.base import Reach, sliding_resistance, surfaces_below
+from rigdda.dynamics.history import History
 from rigdda.dynamics.monitors import chainages
 from rigdda.dynamics.run import Run
 from rigdda.dynamics.simulation import Simulation
@@ -55,6 +56,7 @@ from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step_of_single
 from rigdda.model.site import Site
 from rigdda.model.site_tables import Drawn
+from rigdda.model.terrain import Terrain
 
 NEVER: NDArray[np.float64] = np.zeros(0)
 """Times of intermediate frames that are recorded: none."""
@@ -126,8 +128,8 @@ class SingleReleases:
             road_area=barrier.area_beyond(self._site.road.start, outline),
         )
 
-    def ending(self, drawn: Drawn) -> Ending | None:
-        """Return how a release of a single block ends.
+    def ending(self, drawn: Drawn, history: History | None = None) -> Ending | None:
+        """Return how a release of a single block ends, and fill its history if one is given.
 
         Returns None if the release must be simulated as a scene, see `SingleBlock.run`.
         """
@@ -153,7 +155,7 @@ class SingleReleases:
             for bears, barrier in zip(resistances, barriers, strict=True)
         ]
         steps = max(1, round(site.motion.duration / dt))
-        found = arrays.run(block, meetings, forces, limits, drawn.stems, steps)
+        found = arrays.run(block, meetings, forces, limits, drawn.stems, steps, history)
         if found is None:
             return None
         return self._ending(found, area, block.density, barriers, resistances)
@@ -310,16 +312,23 @@ class Batch:
         """Return how a release ended, the name of its event and its width [m]."""
         return self.ending(drawn), drawn.event, drawn.width
 
-    def ending(self, drawn: Drawn) -> Ending:
-        """Return how a drawn release ends. Raises the errors of `rigdda.release`."""
+    def ending(self, drawn: Drawn, history: History | None = None) -> Ending:
+        """Return how a drawn release ends, and fill its history if one is given.
+
+        Raises the errors of `rigdda.release`.
+        """
         if len(drawn.blocks) == 1 and self._single is not None:
-            ended = self._single.ending(drawn)
+            ended = self._single.ending(drawn, history)
             if ended is not None:
                 return ended
         duration = self._site.motion.duration
         # intermediate frames are needed to see a wall that slides or overturns and stands again
         moving = any(isinstance(barrier, GravityWall) for barrier in self._standing)
-        run = self.simulation(self.scene(drawn)).run(duration, EVERY if moving else duration)
+        simulation, every = self.simulation(self.scene(drawn)), EVERY if moving else duration
+        if history is None:
+            run = simulation.run(duration, every)
+        else:
+            run = history.run(simulation, duration, every)
         return ending(run, stations(self._site, run.scene.barriers), self._site.road.start)
 
     def scene(self, drawn: Drawn) -> Scene:
@@ -353,6 +362,12 @@ class Batch:
             template = Template(scene, settings, lines, self._watch, beyond)
             self._templates[key] = template
         return Simulation(scene, settings, template=template)
+
+    @property
+    def ground(self) -> Terrain:
+        """The ground with its earthworks, without pits; known after the first release."""
+        assert self._base is not None and self._base[0].smooth_ground is not None
+        return self._base[0].smooth_ground
 
     def lines(self, scene: Scene) -> tuple[float, ...]:
         """Return the ascending stations at which `simulation` records crossings [m]."""

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rigdda.dynamics.arrays import Outlines
 from rigdda.dynamics.constants import AWAKE, MARGIN_RATIO, PENETRATION_RATIO
 from rigdda.dynamics.frames import no_frames
+from rigdda.dynamics.history import History
 from rigdda.dynamics.loop import Loop
 from rigdda.dynamics.packing import fences, pack, write_bodies
 from rigdda.dynamics.records import TARGET, Bodies, Interfaces
@@ -270,6 +271,7 @@ class SingleBlock:
         limits: Sequence[float],
         stems: Stemmed,
         steps: int,
+        history: History | None = None,
     ) -> Descent | None:
         """Simulate the descent of a block.
 
@@ -287,6 +289,8 @@ class SingleBlock:
             Stems that the block strikes, see `Scene.stems`, for which `has_room`.
         steps : int
             Maximum number of steps.
+        history : History, optional
+            Filled with the states of the block.
 
         Returns
         -------
@@ -319,7 +323,10 @@ class SingleBlock:
         if not clear:
             return None
         try:
-            loop.advance(steps, self._no_frames)
+            if history is None:
+                loop.advance(steps, self._no_frames)
+            else:
+                history.follow(loop, steps)
         except Diverged:
             return None
         place, velocity, extent, energy = read_single_directly.call(a.bodies, a.monitors.rock)

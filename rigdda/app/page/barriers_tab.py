@@ -215,7 +215,8 @@ class BarriersTab:
             self._release.stop()
         site = self.project.site
         single = [e.name for e in site.events if e.number == (1, 1) and site.source(e.source).band]
-        self._release = Release(site, self.project.layout, single or site.event_names[:1])
+        event = (single or list(site.event_names))[0]
+        self._release = Release(site, self.project.layout, event)
         self._drawn = 0
         self.section.ways.data = {"xs": [], "ys": [], "colour": [], "words": []}
         self._release.more(DRAWN if single else 3)
@@ -228,8 +229,7 @@ class BarriersTab:
         self.section.ways.stream(ways(falls, self._colour))
 
     def _colour(self, fall: Fall) -> str:
-        reaches = fall.end in ("stops on the road", "passes the road")
-        return SERIES[1] if reaches else SERIES[0]
+        return SERIES[1] if fall.reaches else SERIES[0]
 
     def _show_figures(self, found: Figures) -> None:
         """Show the figures of the layout, each with what it is of."""

@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 WIDE = 430
 """Width of the column of prices [pixels]."""
 
+VERIFIED = "verification"
+"""Stage of the evaluations on releases that the search did not use."""
+
 BEST = 8
 """Number of layouts in the table."""
 
@@ -83,7 +86,7 @@ class DecideTab:
         self.panel = pn.Row(
             pn.Column(
                 pn.Row(self._designer, self._budget, self._verify, self._cost),
-                pn.Row(text("Kinds:", width="60px"), self._kinds),
+                pn.Row(pn.pane.HTML("Kinds:", width=50, margin=(8, 8)), self._kinds),
                 pn.Row(self._start, self._cancel, self._resume, self._bar),
                 self._status, self._plot, self._only, self._table, sizing_mode="stretch_width",
             ),
@@ -196,7 +199,7 @@ class DecideTab:
         return self._meets[layout]
 
     def _show_found(self) -> None:
-        found = sorted(self._found, key=lambda one: one.objective)
+        found = sorted(self._found, key=lambda one: (one.stage != VERIFIED, one.objective))
         if self._only.value:
             found = [one for one in found[:60] if self._met(one.layout)]
         self._plot.visible = bool(found)
@@ -204,13 +207,13 @@ class DecideTab:
         self._points.data = {
             "x": [one.capital for one in found],
             "y": [one.risk for one in found],
-            "colour": [SERIES[1] if one.stage == "verification" else SERIES[0] for one in found],
+            "colour": [SERIES[1] if one.stage == VERIFIED else SERIES[0] for one in found],
             "words": [_words(one) for one in found],
             "place": list(range(len(found))),
         }
         rows: list[Any] = [heading("The best layouts so far")] if found else []
         for one in found[:BEST]:
-            verified = "verified" if one.stage == "verification" else "unverified"
+            verified = "verified" if one.stage == VERIFIED else "unverified"
             ends = f"{shown(one.objective)} ({shown(one.low)} to {shown(one.high)})"
             words = f"Z = {ends}, {verified}, {one.releases:,} releases: {_words(one)}"
             rows.append(
@@ -235,7 +238,10 @@ class DecideTab:
         """Build the sliders of prices and consequences."""
         rows: list[Any] = [
             heading("Prices and consequences"),
-            text("Nothing is simulated when one of them changes: the releases are kept."),
+            text(
+                "Nothing is simulated when one of them changes: the figures in the tab Barriers "
+                "follow at once. A search keeps the prices that it began with."
+            ),
         ]
         for table, kind in (("consequences", Consequences), ("prices", Prices)):
             for field in described(kind):

@@ -13,7 +13,6 @@ import panel as pn
 from bokeh.models import ColumnDataSource, HoverTool, PointDrawTool, Range1d, TapTool
 from bokeh.plotting import figure
 
-import rigdda
 from rigdda import Error
 from rigdda.agents.reports import simulation_folder, stations
 from rigdda.agents.reports.stations import QUANTITIES, Passing
@@ -36,7 +35,10 @@ WIDE = 430
 BY_END, BY_EVENT, BY_SPEED, BY_ENERGY = (
     "where it ends", "event", "greatest speed", "greatest energy",
 )  # fmt: skip
-"""What colours the ways."""
+"""What colours the paths."""
+
+END_COLOURS = dict(zip(ENDS.values(), (SERIES[k] for k in (4, 2, 5, 1, 3)), strict=True))
+"""Colour of each end."""
 
 COLLECTED = ("energy", "velocity", "height", "height_normal")
 """Quantities of the collector."""
@@ -99,7 +101,7 @@ class FallsTab:
         self._shown: Any = None
         self._drawn = 0
         self._for: Any = None
-        self._run: Any = None
+        self._replayed: Fall | None = None
         self._event = pn.widgets.Select(name="Event", options=[], width=150)
         self._built = pn.widgets.Checkbox(name="With the layout", value=True, margin=(24, 8))
         self._by = pn.widgets.Select(
@@ -176,7 +178,7 @@ class FallsTab:
                 self._shown = self._passed
                 self._show_collector()
                 self._show_envelopes()
-        if self._play.value and self._run is not None:
+        if self._play.value and self._replayed is not None:
             later = self._time.value + 0.1
             self._play.value = later <= self._time.end
             self._time.value = min(later, self._time.end)
@@ -233,7 +235,7 @@ class FallsTab:
         """Forget the releases, as something that they depend on has changed."""
         if self._release is not None:
             self._release.stop()
-        self._release, self._passed, self._shown, self._run = None, None, None, None
+        self._release, self._passed, self._shown, self._replayed = None, None, None, None
         self._drawn = 0
         self.section.ways.data = {"xs": [], "ys": [], "colour": [], "words": []}
         for source in (self._envelope, self._bars, self._curve, self._block, self._hits,
@@ -259,7 +261,7 @@ class FallsTab:
         if not self.project.has_site or not self._event.value:
             return
         if self._release is None:
-            self._release = Release(self.project.site, self._layout, [self._event.value])
+            self._release = Release(self.project.site, self._layout, self._event.value)
         self._release.more(BATCH)
 
     def _end(self) -> None:
@@ -315,7 +317,7 @@ class FallsTab:
             case "greatest energy":
                 return self._scaled(float(fall.energy.max()), self._top("energy"))
             case _:
-                return SERIES[(4, 2, 5, 1, 3)[ENDS.index(fall.end)]]
+                return END_COLOURS[fall.end]
 
     def _top(self, name: str) -> float:
         falls = self._release.falls[: self._drawn] if self._release else []
@@ -340,7 +342,7 @@ class FallsTab:
     def _show_legend(self) -> None:
         by = self._by.value
         if by == BY_END:
-            items = list(zip(ENDS, (SERIES[k] for k in (4, 2, 5, 1, 3)), strict=True))
+            items = list(END_COLOURS.items())
         elif by == BY_EVENT and self.project.has_site:
             items = list(zip(self.project.site.event_names, SERIES, strict=False))
         else:
@@ -438,10 +440,8 @@ class FallsTab:
 
     def _replay(self, fall: Fall) -> None:
         site, project = self.project.site, self.project
-        self._run, _ = rigdda.release(site, self._layout, fall.seed, fall.event)
-        hits = self._run.events
-        hits = hits[hits["block"] == fall.block]
-        self._hits.data = {"x": hits["x"], "y": hits["y"]}
+        self._replayed = fall
+        self._hits.data = dict(zip("xy", fall.impacts, strict=True))
         ground = [site.profile.height(x) for x in np.clip(
             fall.x, site.slope.points[0][0], site.slope.points[-1][0]).tolist()]  # fmt: skip
         self._track.data = {
@@ -449,7 +449,7 @@ class FallsTab:
         }  # fmt: skip
         _fit(self._tracks, fall.x, fall.energy)
         self._tracks.visible = True
-        self._time.end = float(self._run.times[-1])
+        self._time.end = fall.duration
         self._time.value = 0.0
         self._time.visible = self._play.visible = True
         parts = ["rigdda", "replay", str(project.where.site), "--event", fall.event]
@@ -464,19 +464,10 @@ class FallsTab:
         self._show_block()
 
     def _show_block(self) -> None:
-        """Draw the blocks of the replay at the time of the slider."""
-        if self._run is None:
-            return
-        k = min(int(np.searchsorted(self._run.times, self._time.value)), len(self._run.times) - 1)
-        xs, ys = [], []
-        for i, block in enumerate(self._run.scene.blocks):
-            x, y, turn = self._run.poses[k, i]
-            x0, y0, turn0 = self._run.poses[0, i]
-            cos, sin = np.cos(turn - turn0), np.sin(turn - turn0)
-            arm = block.vertices - np.array([x0, y0])
-            xs.append(x + cos * arm[:, 0] - sin * arm[:, 1])
-            ys.append(y + sin * arm[:, 0] + cos * arm[:, 1])
-        self._block.data = {"xs": xs, "ys": ys}
+        """Draw the block of the replay at the time of the slider."""
+        if self._replayed is not None:
+            outline = self._replayed.outline(self._time.value)
+            self._block.data = {"xs": [outline[:, 0]], "ys": [outline[:, 1]]}
 
 
 def _fit(plot: Any, x: Any, y: Any) -> None:

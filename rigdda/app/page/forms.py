@@ -13,6 +13,7 @@ UNITS = {
     "kJ": "kilojoules", "J/m": "joules per metre", "years": "years", "-": "",
     "kg/m3": "kilograms per cubic metre", "m/s": "metres per second", "EUR/m": "EUR per metre",
     "EUR/m2": "EUR per square metre", "EUR/m3": "EUR per cubic metre",
+    "EUR/day": "EUR per day", "1/year": "per year",
     "1/year per 100 m of slope": "per year on 100 metres of slope",
 }  # fmt: skip
 """Units in full words."""

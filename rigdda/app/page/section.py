@@ -50,7 +50,11 @@ class Section:
     theme : Theme
         The colours.
     name : str
-        Name of the figure for screen readers.
+        Title of the figure.
+    height : int
+        Its height [pixels].
+    coordinates : bool
+        Whether it shows the coordinates and the inclination of the ground under the cursor.
 
     Attributes
     ----------
@@ -58,8 +62,8 @@ class Section:
         The figure.
     """
 
-    def __init__(self, theme: Theme, name: str, height: int = HEIGHT):
-        self.theme = theme
+    def __init__(self, theme: Theme, name: str, height: int = HEIGHT, coordinates: bool = False):
+        self.theme, self._coordinates = theme, coordinates
         self.plot = figure(
             height=height, sizing_mode="stretch_width", match_aspect=True,
             tools="pan,wheel_zoom,box_zoom,reset", active_scroll="wheel_zoom", active_drag="pan",
@@ -103,13 +107,16 @@ class Section:
         odd = plot.scatter("x", "y", source=self._odd, marker="x", size=15, line_width=3,
                            line_color=theme.bad)  # fmt: skip
         plot.add_tools(
-            HoverTool(
-                renderers=[line], mode="vline", line_policy="prev", description="coordinates",
-                tooltips=[("chainage", "$x{0.00} metres"), ("elevation", "$y{0.00} metres"),
-                          ("slope here", "@slope{0.0} degrees")],
-            ),
-            HoverTool(renderers=[odd], description="outliers", tooltips=[("doubtful", "@words")]),
-        )  # fmt: skip
+            HoverTool(renderers=[odd], description="outliers", tooltips=[("doubtful", "@words")])
+        )
+        if self._coordinates:
+            plot.add_tools(
+                HoverTool(
+                    renderers=[line], mode="vline", line_policy="prev", description="coordinates",
+                    tooltips=[("chainage", "$x{0.00} metres"), ("elevation", "$y{0.00} metres"),
+                              ("slope here", "@slope{0.0} degrees")],
+                )
+            )  # fmt: skip
 
     def show(self, site: Site, layout: Layout = ()) -> None:
         """Draw a site and a layout; a barrier that cannot stand is left out."""

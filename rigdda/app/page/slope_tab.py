@@ -72,7 +72,7 @@ class SlopeTab:
 
     def __init__(self, page: Page):
         self.page, self.project, self.theme = page, page.project, page.theme
-        self.section = Section(self.theme, "Section of the slope")
+        self.section = Section(self.theme, "Section of the slope", coordinates=True)
         self._showing = False
         self._handles: list[Handle] = []
         self._bound: list[Bound] = []
@@ -134,8 +134,10 @@ class SlopeTab:
         plot.add_tools(drag)
         plot.toolbar.active_drag = drag
         plot.add_tools(
-            HoverTool(renderers=[places], tooltips=[("", "@words"), ("chainage", "@x{0.00} metres")],
-                      description="names of the handles")
+            HoverTool(
+                renderers=[places], description="names of the handles",
+                tooltips=[("", "@words"), ("chainage", "@x{0.00} metres")],
+            )
         )  # fmt: skip
         self._places.on_change("data", self._dragged)
         self._points.on_change("data", self._dragged_point)

@@ -10,9 +10,9 @@ from matplotlib.image import imsave
 
 import rigdda.envs
 from rigdda import Barrier, Ditch, Fence, Site
-from rigdda.agents.reports import pictures
-from rigdda.agents.reports.simulation_folder import along
-from rigdda.agents.reports.stations import Passing, summary
+from rigdda.app.reports import pictures
+from rigdda.app.reports.simulation_folder import along
+from rigdda.app.reports.stations import Passing, summary
 from rigdda.envs.corridor_environment import CorridorDesign
 from rigdda.files import atomic
 from rigdda.passages import passages

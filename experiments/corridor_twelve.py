@@ -20,7 +20,7 @@ from msgspec.structs import replace
 from experiments.script import Number, main, say, write
 from rigdda import Corridor
 from rigdda.agents.corridor.planning import Planner
-from rigdda.agents.reports.corridor_folder import budget_rows
+from rigdda.app.reports.corridor_folder import budget_rows
 from rigdda.envs import CorridorProblem
 
 NAME = "corridor-12"

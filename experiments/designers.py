@@ -35,9 +35,9 @@ from experiments.script import (
 )
 from rigdda import MECHANICS, BadInput, Layout, sites
 from rigdda.agents import designers
-from rigdda.agents.cli import BUDGET
 from rigdda.agents.designers.protocol import verify
 from rigdda.agents.designers.store import Store
+from rigdda.app.cli import BUDGET
 from rigdda.barriers import describe
 from rigdda.envs import DesignProblem, Evaluation
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from experiments.script import Number, main, say, write
 from rigdda import Site
-from rigdda.agents.reports.stations import LEVELS, QUANTITIES, Passing
+from rigdda.app.reports.stations import LEVELS, QUANTITIES, Passing
 from rigdda.envs.quantiles import quantiles
 from rigdda.passages import passages
 

@@ -29,8 +29,8 @@ from rigdda.agents.designers import race
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import release_seeds, verify
-from rigdda.agents.exam import specification
-from rigdda.agents.exam.specification import Anchor, ExamCorridor, References, Specification, tables
+from rigdda.app.exam import specification
+from rigdda.app.exam.specification import Anchor, ExamCorridor, References, Specification, tables
 from rigdda.envs import CorridorProblem, DesignProblem
 
 CHOICE, VALUE = 0.1, 0.2

@@ -24,7 +24,7 @@ import numpy as np
 
 from experiments.script import say
 from rigdda import Site, sites
-from rigdda.agents.exam import specification
+from rigdda.app.exam import specification
 from rigdda.envs import ensemble, envelope, outcome_cache, site_store
 from rigdda.files import atomic
 

@@ -20,10 +20,10 @@ import click
 from scipy.stats import kendalltau
 
 from experiments.script import Number, folder, options, say, write
-from rigdda.agents.exam import ranking, scorer, specification
-from rigdda.agents.exam.scorer import ExamPart, Scorer
+from rigdda.app.exam import ranking, scorer, specification
+from rigdda.app.exam.scorer import ExamPart, Scorer
 
-MODULE = "rigdda.agents.exam.entries"
+MODULE = "rigdda.app.exam.entries"
 
 STILL = ("nothing", "constant", "engineering_rule", "random_layout")
 """Entries that do not search."""

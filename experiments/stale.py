@@ -15,7 +15,7 @@ import click
 from experiments.made_by import MADE_BY, made_by
 from experiments.script import RESULTS
 from rigdda import MECHANICS
-from rigdda.agents.exam import specification
+from rigdda.app.exam import specification
 from rigdda.envs import site_store
 
 UNKNOWN = "made by unknown mechanics"

@@ -18,22 +18,22 @@ from .barriers.layout import load_layout, save_layout
 from .dynamics.run import Run
 from .dynamics.simulation import Simulation, simulate_many
 from .errors import BadInput, Diverged, DoubtfulInput, Error, SoftContacts
+from .ground import grounds
+from .ground.prices import Bill, Consequences, Prices
+from .ground.surface import Surface
+from .ground.terrain import Terrain
 from .lumped_mass import Points, lumped
-from .model import grounds
 from .model.block import Block
 from .model.corridor import Corridor, CorridorSection
 from .model.existing import Existing
 from .model.forest import Forest
 from .model.loads import BodyForce, Bolt, FixedPoint, LineLoad, PointLoad
 from .model.outcome import BarrierOutcome, Outcome
-from .model.prices import Bill, Consequences, Prices
 from .model.scene import Scene
 from .model.settings import Settings
 from .model.site import Site
 from .model.site_tables import Drawn, Event
 from .model.source import Source
-from .model.surface import Surface
-from .model.terrain import Terrain
 from .model.traffic import Toll, Traffic
 from .releases import release, release_many, release_outcome
 from .trajectory import Trajectories, trajectories, trajectory_parts

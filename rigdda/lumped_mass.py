@@ -27,11 +27,11 @@ from rigdda.dynamics.point_mass import (
 )
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
+from rigdda.ground.terrain import Terrain
 from rigdda.model.scene import check_known
 from rigdda.model.settings import EARTH
 from rigdda.model.site import Site
 from rigdda.model.site_tables import Drawn, Rebound
-from rigdda.model.terrain import Terrain
 from rigdda.releases import as_site
 
 Floats = NDArray[np.float64]

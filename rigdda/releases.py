@@ -37,6 +37,7 @@ from rigdda.dynamics.single_block import MOST_CORNERS, Descent, SingleBlock
 from rigdda.dynamics.template import Template
 from rigdda.errors import BadInput, DoubtfulInput, Error
 from rigdda.geometry import clearly_convex, polygon_properties
+from rigdda.ground.terrain import Terrain
 from rigdda.measurement import (
     STANDS,
     BarrierEnding,
@@ -56,7 +57,6 @@ from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step_of_single
 from rigdda.model.site import Site
 from rigdda.model.site_tables import Drawn
-from rigdda.model.terrain import Terrain
 
 NEVER: NDArray[np.float64] = np.zeros(0)
 """Times of intermediate frames that are recorded: none."""

@@ -27,12 +27,12 @@ from rigdda.dynamics.history import History
 from rigdda.dynamics.records import LEDGER
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
+from rigdda.ground.terrain import Terrain
 from rigdda.measurement import Ending, holding, judge
 from rigdda.model.outcome import Outcome
 from rigdda.model.settings import EARTH
 from rigdda.model.site import Site
 from rigdda.model.site_tables import Drawn
-from rigdda.model.terrain import Terrain
 from rigdda.releases import TOGETHER, Batch, as_site, by_size, check_duration
 
 Floats = NDArray[np.float64]

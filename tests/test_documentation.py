@@ -20,7 +20,7 @@ import tomli_w
 
 import rigdda
 from rigdda import BadInput
-from rigdda.agents import browser, cli, studies
+from rigdda.app import browser, cli, studies
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

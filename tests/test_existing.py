@@ -15,9 +15,9 @@ import rigdda
 from rigdda import BadInput, Ditch, Fence, Mesh, Site, release, release_many
 from rigdda.agents import designers
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.reports import findings
-from rigdda.agents.reports.wording import before, order, unchanged
-from rigdda.agents.site_check import facts, oddities
+from rigdda.app.reports import findings
+from rigdda.app.reports.wording import before, order, unchanged
+from rigdda.app.site_check import facts, oddities
 from rigdda.barriers import Removal
 from rigdda.barriers.fence import WornFence
 from rigdda.envs import DesignProblem

@@ -22,7 +22,7 @@ from rigdda import (
     save_layout,
     sites,
 )
-from rigdda.agents import cli
+from rigdda.app import cli
 from rigdda.barriers import KINDS
 from rigdda.fields import checked, described, read
 from rigdda.sites import document

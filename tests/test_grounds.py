@@ -21,11 +21,11 @@ from rigdda import (
 from rigdda.dynamics.packing import pack_interfaces
 from rigdda.envs import outcome_cache
 from rigdda.envs.outcome_cache import Memory
-from rigdda.model.grounds import GROUNDS, OTHER, USUAL
+from rigdda.ground.grounds import GROUNDS, OTHER, USUAL
+from rigdda.ground.surface import Interface, smaller
+from rigdda.ground.terrain import REACH, Roughness, Terrain
 from rigdda.model.site import FARTHEST
 from rigdda.model.site_tables import Motion
-from rigdda.model.surface import Interface, smaller
-from rigdda.model.terrain import REACH, Roughness, Terrain
 from rigdda.releases import Batch
 from rigdda.validation.scenes import box
 

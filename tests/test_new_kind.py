@@ -10,7 +10,7 @@ import pytest
 
 from rigdda import Run, Site, load_layout, release, save_layout
 from rigdda.agents.designers import module
-from rigdda.agents.reports.wording import order
+from rigdda.app.reports.wording import order
 from rigdda.barriers import KINDS, Ditch, Standing, describe
 from rigdda.barriers.base import Floats, KnownSite, Metres
 from rigdda.envs import DesignProblem

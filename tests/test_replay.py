@@ -20,10 +20,10 @@ from rigdda.barriers import Built, Embankment, Fence, GravityWall, Wall
 from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
 from rigdda.dynamics.run import EVENT, Run
 from rigdda.errors import BadInput, Error
+from rigdda.ground.surface import Surface
+from rigdda.ground.terrain import Terrain
 from rigdda.model.block import Block
 from rigdda.model.scene import Scene
-from rigdda.model.surface import Surface
-from rigdda.model.terrain import Terrain
 from rigdda.replay import recording as replay
 from rigdda.replay import viewer
 from rigdda.replay.recording import PLOTS, Marks

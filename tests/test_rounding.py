@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigdda.agents.reports import html_blocks
-from rigdda.agents.reports.corridor_folder import thousands
-from rigdda.agents.reports.exhibits import EXHIBITS
-from rigdda.agents.reports.tables import bounded, risk_table
-from rigdda.agents.reports.wording import at_most, euros, figure, percent, small, span, tenth
+from rigdda.app.reports import html_blocks
+from rigdda.app.reports.corridor_folder import thousands
+from rigdda.app.reports.exhibits import EXHIBITS
+from rigdda.app.reports.tables import bounded, risk_table
+from rigdda.app.reports.wording import at_most, euros, figure, percent, small, span, tenth
 from rigdda.envs.cost import Risk
 from rigdda.envs.intervals import Mean, estimate
 from rigdda.rounding import between, rounded

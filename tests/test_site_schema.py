@@ -21,9 +21,9 @@ from rigdda import (
     Wall,
     sites,
 )
+from rigdda.ground.surface import Interface
 from rigdda.model import loose_blocks
 from rigdda.model.site_tables import Motion, Slope, Stretch
-from rigdda.model.surface import Interface
 
 QUICK = Site.load("quick")
 VERGE = Site.load("verge")

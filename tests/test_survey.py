@@ -15,9 +15,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rigdda import BadInput, Site
-from rigdda.agents import new_site
-from rigdda.agents.new_site import SiteRequest, compose
-from rigdda.model.grounds import GROUNDS
+from rigdda.app import new_site
+from rigdda.app.new_site import SiteRequest, compose
+from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import Survey, parse_table, profile_of, read_survey
 from rigdda.sites.schema import schema
 

@@ -16,7 +16,7 @@ from light_site import LIGHT
 
 import rigdda
 from rigdda import BadInput, Fence, GravityWall, Outcome, Site
-from rigdda.agents.reports.tables import write_outcomes
+from rigdda.app.reports.tables import write_outcomes
 from rigdda.envs import DesignProblem
 from rigdda.envs.cost import Risk, judge
 from rigdda.envs.intervals import Mean

@@ -24,8 +24,8 @@ from scipy.optimize import brentq
 
 from experiments.script import BLUE, GREEN, ORANGE, RED, Number, draw, say, write
 from rigdda import Site
-from rigdda.agents.fit import Floats, Model, run_outs
-from rigdda.agents.parameters import Parameter, with_values
+from rigdda.app.uncertainty.fit import Floats, Model, run_outs
+from rigdda.app.uncertainty.parameters import Parameter, with_values
 
 HERE = Path(__file__).parent
 

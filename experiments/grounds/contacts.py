@@ -21,9 +21,9 @@ import msgspec
 import numpy as np
 
 from rigdda import Block, Scene, Settings, Simulation, Surface, Terrain
-from rigdda.agents.fit import Floats
+from rigdda.app.uncertainty.fit import Floats
+from rigdda.ground.terrain import Roughness
 from rigdda.model.site import FARTHEST
-from rigdda.model.terrain import Roughness
 
 SEEN = Path(__file__).parent / "chant_sura_contacts.csv"
 

@@ -28,9 +28,9 @@ from experiments.grounds.reach import SLOWED_AT
 from experiments.grounds.study import FACE, FRESH, RANGES, Field, tschamut_figures
 from experiments.script import Number, main, say, write
 from rigdda import Scene, Settings, Simulation, Site, Surface
-from rigdda.agents.fit import Floats, scores
-from rigdda.agents.parameters import Parameter
-from rigdda.model.grounds import GROUNDS
+from rigdda.app.uncertainty.fit import Floats, scores
+from rigdda.app.uncertainty.parameters import Parameter
+from rigdda.ground.grounds import GROUNDS
 from rigdda.validation.scenes import GRAVITY
 from rigdda.validation.slides import slab_scene
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigdda import Site, Surface, release_many
 from rigdda.envs.intervals import mid_p
-from rigdda.model.grounds import GROUNDS
+from rigdda.ground.grounds import GROUNDS
 
 SLOPE = Path(__file__).parent / "slope.toml"
 

@@ -29,9 +29,9 @@ from experiments.grounds.reach import SLOWED_AT
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, say, write
 from experiments.tschamut.study import observed_run_outs, runs
 from rigdda import Site, Surface
-from rigdda.agents import fit
-from rigdda.agents.fit import Floats, explore, scores
-from rigdda.model.grounds import GROUNDS
+from rigdda.app.uncertainty import fit
+from rigdda.app.uncertainty.fit import Floats, explore, scores
+from rigdda.ground.grounds import GROUNDS
 from rigdda.model.site_tables import Rebound, Scatter
 
 TSCHAMUT = Path(tschamut.__file__).parent

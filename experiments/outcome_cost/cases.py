@@ -10,8 +10,8 @@ from msgspec.structs import replace
 
 from experiments.bench.cases import RUN_OUT
 from rigdda import Site
+from rigdda.ground.surface import Surface
 from rigdda.model.site_tables import Drawn
-from rigdda.model.surface import Surface
 
 TSCHAMUT = Path(__file__).parent.parent / "tschamut" / "site.toml"
 

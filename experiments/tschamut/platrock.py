@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from rigdda import Site
-from rigdda.agents.parameters import Floats, Parameter
+from rigdda.app.uncertainty.parameters import Floats, Parameter
 
 PYTHON = "PLATROCK_PYTHON"
 """Environment variable with the Python that has PlatRock installed; without it, PlatRock is

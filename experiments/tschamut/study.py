@@ -28,9 +28,9 @@ from matplotlib.figure import Figure
 from experiments.script import BLUE, GREEN, GREY, ORANGE, RED, Number, draw, interval, say, write
 from experiments.tschamut.platrock import PARAMETERS, PYTHON, PlatRock
 from rigdda import Site, release
-from rigdda.agents import fit, observations
-from rigdda.agents.fit import Fit, Floats, seen
-from rigdda.agents.parameters import Parameter, parse, with_values
+from rigdda.app.uncertainty import fit, observations
+from rigdda.app.uncertainty.fit import Fit, Floats, seen
+from rigdda.app.uncertainty.parameters import Parameter, parse, with_values
 
 HERE = Path(__file__).parent
 
@@ -89,7 +89,7 @@ def runs(site: Site, model: fit.Model, events: Sequence[str], seeds: range) -> d
 
 
 def table(model: str, fitted: Fit, observed: dict[str, Floats], seconds: float) -> list[dict]:
-    """Return rows as `rigdda.agents.fit.rows` does, with model and processor time [s]."""
+    """Return rows as `rigdda.app.uncertainty.fit.rows` does, with model and processor time [s]."""
     return [{"model": model, "cpu_s": seconds} | row for row in fit.rows(fitted, observed)]
 
 

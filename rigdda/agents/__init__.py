@@ -1,7 +1,6 @@
-"""Designers of barrier layouts, the command line, studies, fits and reports.
+"""Designers of barrier layouts, training of policies and networks, and planning of corridors.
 
-The attribute `rigdda.agents.NAME` imports the designer NAME when it is first used. `AskTell` makes
-a function for any optimiser.
+The attribute `rigdda.agents.NAME` imports the designer NAME when it is first used.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from rigdda.agents.designers import DESIGNERS, module
 
 if TYPE_CHECKING:  # `as` declares these names as exports of this package
-    from rigdda.agents.ask_tell import AskTell as AskTell
     from rigdda.agents.designers import cma as cma
     from rigdda.agents.designers import constant as constant
     from rigdda.agents.designers import convex as convex
@@ -22,14 +20,10 @@ if TYPE_CHECKING:  # `as` declares these names as exports of this package
     from rigdda.agents.designers import rule as rule
     from rigdda.agents.designers import tpe as tpe
 
-__all__ = ["DESIGNERS", "AskTell"]
+__all__ = ["DESIGNERS"]
 
 
 def __getattr__(name: str) -> Any:
-    if name == "AskTell":
-        from rigdda.agents.ask_tell import AskTell
-
-        return AskTell
     if name in DESIGNERS:
         return module(name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,1 +1,1 @@
-"""Applications of the library: the command line, reports and the page in the browser."""
+"""The application: the command line, what its commands compute, and their reports."""

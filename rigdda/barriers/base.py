@@ -16,10 +16,10 @@ from rigdda import fields
 from rigdda.errors import BadInput
 from rigdda.fields import about
 from rigdda.geometry import polygon_properties
-from rigdda.model.barrier_zone import BarrierZone
-from rigdda.model.prices import Prices
-from rigdda.model.surface import Surface
-from rigdda.model.terrain import Terrain
+from rigdda.ground.barrier_zone import BarrierZone
+from rigdda.ground.prices import Prices
+from rigdda.ground.surface import Surface
+from rigdda.ground.terrain import Terrain
 
 Floats = NDArray[np.float64]
 Drawn = Literal["solid", "moving", "line"]

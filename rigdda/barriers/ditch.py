@@ -22,8 +22,8 @@ from rigdda.barriers.base import (
 from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE, regrade, span
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
-from rigdda.model.barrier_zone import BarrierZone
-from rigdda.model.terrain import Terrain
+from rigdda.ground.barrier_zone import BarrierZone
+from rigdda.ground.terrain import Terrain
 
 MIN_FLOOR = 1.0
 """Minimum width of the floor of a designed ditch [m]. A machine must be able to empty it, and rock

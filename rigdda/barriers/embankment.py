@@ -24,8 +24,8 @@ from rigdda.barriers.base import (
 from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE, regrade, span
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
-from rigdda.model.barrier_zone import BarrierZone
-from rigdda.model.terrain import Terrain
+from rigdda.ground.barrier_zone import BarrierZone
+from rigdda.ground.terrain import Terrain
 
 CREST = 1.0
 """Minimum width of the crest of an embankment in a search [m], so that a machine can build it."""

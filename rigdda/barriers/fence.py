@@ -25,8 +25,8 @@ from rigdda.barriers.base import (
 )
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.fields import about, documented
-from rigdda.model.barrier_zone import BarrierZone
-from rigdda.model.terrain import Terrain
+from rigdda.ground.barrier_zone import BarrierZone
+from rigdda.ground.terrain import Terrain
 
 PANEL = 10.0
 """Length of a fence panel along the slope, which acts as a unit [m]."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda.errors import BadInput
-from rigdda.model.terrain import Terrain
+from rigdda.ground.terrain import Terrain
 
 Floats = NDArray[np.float64]
 

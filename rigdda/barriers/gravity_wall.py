@@ -25,8 +25,8 @@ from rigdda.barriers.base import (
 )
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
-from rigdda.model.barrier_zone import BarrierZone
-from rigdda.model.terrain import Terrain
+from rigdda.ground.barrier_zone import BarrierZone
+from rigdda.ground.terrain import Terrain
 
 SLID = 0.1
 """Displacement of a corner beyond which a gravity wall counts as slid [m]. The elastic deformation

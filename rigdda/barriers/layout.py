@@ -23,7 +23,7 @@ from rigdda.barriers.wall import Wall
 from rigdda.errors import BadInput
 from rigdda.fields import about
 from rigdda.files import atomic, read
-from rigdda.model.terrain import Terrain
+from rigdda.ground.terrain import Terrain
 
 Built = Standing | Earthwork
 """Barriers that are part of a scene: all kinds except mesh and removal."""

@@ -19,8 +19,8 @@ from rigdda.barriers.base import STANDS
 from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
 from rigdda.errors import BadInput
 from rigdda.files import atomic
+from rigdda.ground.terrain import Terrain
 from rigdda.model.scene import Scene, scene_from_json, scene_to_json
-from rigdda.model.terrain import Terrain
 
 if TYPE_CHECKING:
     from rigdda.replay.recording import Marks

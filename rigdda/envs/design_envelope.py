@@ -27,7 +27,7 @@ from rigdda.envs.envelope import largest
 from rigdda.envs.outcome_cache import Memory, release_key
 from rigdda.envs.quantiles import BlockSample, Quantile, quantiles
 from rigdda.geometry import polygon_properties
-from rigdda.model.barrier_zone import BarrierZone
+from rigdda.ground.barrier_zone import BarrierZone
 from rigdda.passages import Passages, passages
 
 Floats = NDArray[np.float64]

@@ -33,7 +33,7 @@ from rigdda import BadInput, Barrier, Layout, Mesh
 from rigdda.barriers import KINDS, Removal
 from rigdda.barriers.base import MIN_HEIGHT, TOLERANCE, Span, share_of
 from rigdda.envs.siting import FeasiblePlaces
-from rigdda.model.barrier_zone import BarrierZone
+from rigdda.ground.barrier_zone import BarrierZone
 
 Floats = NDArray[np.float64]
 

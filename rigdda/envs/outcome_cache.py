@@ -31,8 +31,8 @@ from rigdda import (
     Site,
 )
 from rigdda.barriers import Built, Standing, earthworks
+from rigdda.ground.terrain import REACH
 from rigdda.model.settings import EARTH
-from rigdda.model.terrain import REACH
 from rigdda.releases import check_duration
 
 K = TypeVar("K", bound=Hashable)

@@ -20,7 +20,7 @@ from rigdda.envs import design_envelope
 from rigdda.envs.barrier_formulas import BarrierCheck, checks_of
 from rigdda.envs.design_envelope import DesignEnvelope
 from rigdda.envs.fence_checks import demand_at
-from rigdda.model.barrier_zone import BarrierZone
+from rigdda.ground.barrier_zone import BarrierZone
 
 
 def narrow_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> Iterator[BadInput]:

@@ -29,7 +29,7 @@ from rigdda import check, fields
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
 from rigdda.files import atomic, is_file, read
-from rigdda.model.prices import Consequences, Prices
+from rigdda.ground.prices import Consequences, Prices
 from rigdda.model.site import Site
 from rigdda.model.traffic import Traffic
 

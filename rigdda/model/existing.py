@@ -28,7 +28,7 @@ from rigdda.barriers.fence import WornFence
 from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
-from rigdda.model.terrain import Terrain
+from rigdda.ground.terrain import Terrain
 
 KINDS = ("fence", "ditch", "embankment", "gravity_wall", "wall")
 """Kinds that may stand already. Mesh is not among them, because the rates of events are those with

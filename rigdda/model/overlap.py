@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rigdda.errors import BadInput
 from rigdda.geometry import overlap
+from rigdda.ground.terrain import Terrain
 from rigdda.kernel import Direct, short_kernel
-from rigdda.model.terrain import Terrain
 
 FEW = 16
 """Number of blocks up to which bounding boxes are compared in pairs; a tree is faster for more."""

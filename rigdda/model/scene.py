@@ -30,6 +30,8 @@ from rigdda.barriers import (
 )
 from rigdda.errors import BadInput
 from rigdda.geometry import polygon_properties
+from rigdda.ground.surface import Surface, smaller
+from rigdda.ground.terrain import Roughness, Terrain
 from rigdda.model.block import Block
 from rigdda.model.loads import (
     BodyForce,
@@ -43,8 +45,6 @@ from rigdda.model.loads import (
 )
 from rigdda.model.overlap import check_apart, deepest, in_ground
 from rigdda.model.settings import check_damping
-from rigdda.model.surface import Surface, smaller
-from rigdda.model.terrain import Roughness, Terrain
 
 MEMBERS = (
     ("blocks", Block, "rigdda.Block"),

@@ -30,11 +30,13 @@ from rigdda.barriers import (
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.files import atomic, is_file, read
 from rigdda.geometry import polygon_properties
+from rigdda.ground.grounds import GROUNDS, OTHER, USUAL
+from rigdda.ground.prices import ACCESS_HEIGHT, Bill
+from rigdda.ground.surface import Surface, smaller
+from rigdda.ground.terrain import Roughness
 from rigdda.model import existing, forest, loose_blocks, site_names
 from rigdda.model.block import Block
-from rigdda.model.grounds import GROUNDS, OTHER, USUAL
 from rigdda.model.outcome import Outcome
-from rigdda.model.prices import ACCESS_HEIGHT, Bill
 from rigdda.model.random_streams import stream
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
@@ -42,9 +44,7 @@ from rigdda.model.site_generator import generate
 from rigdda.model.site_tables import Drawn, Event, SiteTables
 from rigdda.model.soundness import check_site
 from rigdda.model.source import Source
-from rigdda.model.surface import Surface, smaller
 from rigdda.model.survey import SURVEYS
-from rigdda.model.terrain import Roughness
 from rigdda.model.traffic import Toll
 
 Value = TypeVar("Value")

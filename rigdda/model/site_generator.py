@@ -18,11 +18,11 @@ import numpy as np
 
 from rigdda import check
 from rigdda.barriers import MeshOption
-from rigdda.model.prices import Consequences, Prices
+from rigdda.ground.prices import Consequences, Prices
+from rigdda.ground.surface import Surface
 from rigdda.model.site_names import FAMILIES
 from rigdda.model.site_tables import BarrierZone, Event, Road, SiteTables, Slope, Stretch
 from rigdda.model.source import Point, Source
-from rigdda.model.surface import Surface
 
 S = TypeVar("S", bound=SiteTables)
 

@@ -15,16 +15,16 @@ from rigdda import check, fields
 from rigdda.barriers import MeshOption
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
-from rigdda.model.barrier_zone import BarrierZone
+from rigdda.ground.barrier_zone import BarrierZone
+from rigdda.ground.prices import Consequences, Prices
+from rigdda.ground.surface import Interface, Surface
+from rigdda.ground.terrain import Roughness, Terrain
 from rigdda.model.block import Block
 from rigdda.model.existing import Existing
 from rigdda.model.forest import Forest
 from rigdda.model.partial_factors import PartialFactors
-from rigdda.model.prices import Consequences, Prices
 from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT, check_damping
 from rigdda.model.source import Point, Source
-from rigdda.model.surface import Interface, Surface
-from rigdda.model.terrain import Roughness, Terrain
 from rigdda.model.traffic import Traffic
 
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from rigdda import check, fields
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.geometry import overlap
+from rigdda.ground.prices import DITCHES
+from rigdda.ground.surface import check_surface
 from rigdda.model import loose_blocks
-from rigdda.model.prices import DITCHES
 from rigdda.model.settings import Settings
 from rigdda.model.site_tables import SiteTables
 from rigdda.model.source import NEAR, Point, Source
-from rigdda.model.surface import check_surface
 
 BEYOND = 30.0
 """Minimum length of the ground beyond the road [m], so that blocks that cross the road count as

@@ -28,8 +28,8 @@ from rigdda.barriers.base import STANDS
 from rigdda.errors import BadInput
 from rigdda.files import atomic
 from rigdda.geometry import polygon_properties
+from rigdda.ground.terrain import Terrain
 from rigdda.model.scene import Scene
-from rigdda.model.terrain import Terrain
 from rigdda.replay.viewer import rrd_path
 
 Colour = tuple[int, int, int]

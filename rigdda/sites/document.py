@@ -14,12 +14,13 @@ from rigdda import sites
 from rigdda.barriers import KINDS, MeshOption
 from rigdda.fields import Described, described
 from rigdda.files import atomic
+from rigdda.ground.grounds import GROUNDS
+from rigdda.ground.prices import Consequences, Prices
+from rigdda.ground.surface import Interface, Surface
 from rigdda.model.existing import Existing
 from rigdda.model.forest import Forest
-from rigdda.model.grounds import GROUNDS
 from rigdda.model.joints import JointSet
 from rigdda.model.partial_factors import PartialFactors
-from rigdda.model.prices import Consequences, Prices
 from rigdda.model.site_tables import (
     BarrierZone,
     Event,
@@ -33,7 +34,6 @@ from rigdda.model.site_tables import (
     Stretch,
 )
 from rigdda.model.source import Source
-from rigdda.model.surface import Interface, Surface
 from rigdda.model.traffic import Traffic
 
 PATH = Path(__file__).parents[2] / "docs" / "site.md"

@@ -217,7 +217,7 @@ def test_every_designer_has_a_name() -> None:
 
 def test_importing_the_package_imports_nothing_heavy() -> None:
     code = (
-        "import rigdda.agents.cli, sys; heavy = {'torch', 'stable_baselines3', 'matplotlib', "
+        "import rigdda.app.cli, sys; heavy = {'torch', 'stable_baselines3', 'matplotlib', "
         "'rerun', 'cvxpy', 'numba', 'cma', 'optuna', 'safetensors'} & set(sys.modules); "
         "assert not heavy, heavy; "
         "import random; random.random()"

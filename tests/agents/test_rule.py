@@ -7,6 +7,7 @@ import re
 
 import msgspec
 import pytest
+from envelopes import envelope, event
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from valley import SITE
@@ -17,7 +18,7 @@ from rigdda.agents.designers.rule import RuleAnswer, answer, judge
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.barriers.fence import CLASSES
 from rigdda.envs import DesignProblem, design_envelope
-from rigdda.envs.design_envelope import DesignEnvelope, EventEnvelope
+from rigdda.envs.design_envelope import DesignEnvelope
 from rigdda.envs.fence_checks import FenceCheck, demand_at, demands
 from rigdda.envs.quantiles import Quantile
 from rigdda.envs.ritchie_ditch import RitchieDitch
@@ -25,34 +26,6 @@ from rigdda.model.partial_factors import PartialFactors
 
 TRAJECTORY, TOPOGRAPHY, SIZE, ENERGY, FREEBOARD, ELONGATION = 1.10, 1.02, 1.02, 1.2, 0.5, 1.3
 """Factors of UNI 11211-4 and the least freeboard [m], as a designer would look them up."""
-
-
-def exact(value: float) -> Quantile:
-    return Quantile(value, value, value)
-
-
-def event(
-    speeds: list[float], height: float = 1.0, mass: float = 1000.0, name: str = "block"
-) -> EventEnvelope:
-    return EventEnvelope(
-        name=name,
-        releases=2000,
-        blocks=2000,
-        reaching=900,
-        passing=[2000] * len(speeds),
-        speed=[exact(v) for v in speeds],
-        height=[exact(height)] * len(speeds),
-        mass=mass,
-        radius=0.4,
-    )
-
-
-def envelope(
-    stations: dict[float, float], *, height: float = 1.0, mass: float = 1000.0
-) -> DesignEnvelope:
-    """Return an envelope with one event and a characteristic velocity [m/s] at each station."""
-    own = event([*stations.values()], height, mass)
-    return DesignEnvelope([*stations], 0.95, [own], [1.0] * len(stations))
 
 
 def build(

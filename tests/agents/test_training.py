@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_command_line import refused, rig, run
+from processes import refused, rig, run
 
 from rigdda import sites
 from rigdda.agents import policy, training

@@ -12,7 +12,7 @@ from light_site import LIGHT
 
 import rigdda
 from rigdda import BadInput, Site
-from rigdda.agents import cli
+from rigdda.app import cli
 from rigdda.envs import DesignProblem, with_release_rates
 from rigdda.envs.arrivals import ENOUGH, LEAST, MOST, release_rates
 from rigdda.envs.ensemble import SEEDS

@@ -33,7 +33,7 @@ def command(path: Path) -> tuple[int, str, str]:
     root = str(Path(rigdda.__file__).parents[1])
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     process = subprocess.run(
-        [sys.executable, "-m", "rigdda.agents.cli", "repeat", str(path)],
+        [sys.executable, "-m", "rigdda.app.cli", "repeat", str(path)],
         env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, timeout=300,
     )  # fmt: skip
     return process.returncode, process.stdout, process.stderr

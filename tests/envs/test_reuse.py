@@ -13,11 +13,11 @@ import rigdda
 from rigdda import Ditch, Embankment, Fence, Forest, GravityWall, Layout, Outcome, Site
 from rigdda.envs import outcome_cache
 from rigdda.envs.outcome_cache import Memory, Sample, release_key
-from rigdda.model.barrier_zone import BarrierZone
+from rigdda.ground.barrier_zone import BarrierZone
+from rigdda.ground.surface import Interface, Surface
 from rigdda.model.existing import Existing
 from rigdda.model.partial_factors import PartialFactors
 from rigdda.model.site_tables import Origin, Rebound, Road
-from rigdda.model.surface import Interface, Surface
 from rigdda.model.traffic import Traffic
 
 SEEDS = range(24)

@@ -11,7 +11,7 @@ import pytest
 from experiments.grounds import contacts, reach
 from experiments.tschamut.study import BAR
 from rigdda import Scene, Surface, Terrain
-from rigdda.model.grounds import GROUNDS
+from rigdda.ground.grounds import GROUNDS
 from rigdda.validation.scenes import FLAT, GRAVITY, box
 
 RESULTS = Path(__file__).parents[2] / "experiments" / "results"

@@ -23,7 +23,7 @@ from rigdda import (
     release,
     release_outcome,
 )
-from rigdda.agents.parameters import set_numbers
+from rigdda.app.uncertainty.parameters import set_numbers
 from rigdda.model import forest
 from rigdda.model.scene import scene_from_json, scene_to_json
 from rigdda.releases import Batch

@@ -19,9 +19,9 @@ import pytest
 
 import rigdda
 from rigdda import BadInput, Ditch, Site, distribution
-from rigdda.agents import cli
 from rigdda.agents.corridor.planning import Planner
-from rigdda.agents.reports import corridor_folder
+from rigdda.app import cli
+from rigdda.app.reports import corridor_folder
 from rigdda.envs import CorridorProblem
 from rigdda.passages import passages
 
@@ -253,7 +253,7 @@ def test_commands_write_the_same_tables(scheduler: str, tmp_path: Path) -> None:
             "scores.csv",
         ),
         "exam": (
-            ["--entry", "rigdda.agents.exam.entries:random_search", "--sites", "1",
+            ["--entry", "rigdda.app.exam.entries:random_search", "--sites", "1",
              "--budget", "60", "--verify", "20"], "summary.csv",
         ),
         "dataset": (["--sites", "1", "--layouts", "4", "--releases", "10"], "**/*.parquet"),

@@ -17,7 +17,8 @@ import pytest
 import tomli_w
 
 from rigdda import BadInput, Corridor, Site, load_layout
-from rigdda.agents import cli, new_site, observations, studies
+from rigdda.app import cli, new_site, studies
+from rigdda.app.uncertainty import observations
 
 SITE = """
 name = "cut"

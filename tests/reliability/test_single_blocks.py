@@ -12,10 +12,10 @@ import pytest
 import rigdda
 from rigdda import BadInput, Block, Ditch, Embankment, Fence, Layout, Site, Wall, sites
 from rigdda.dynamics.packing import pack_interfaces
+from rigdda.ground.surface import Interface
 from rigdda.model.interfaces import Meetings
 from rigdda.model.random_streams import stream
 from rigdda.model.site_tables import Scatter
-from rigdda.model.surface import Interface
 from rigdda.releases import Batch, SingleReleases, can_share
 
 BENCH = sites.load("bench")

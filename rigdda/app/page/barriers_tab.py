@@ -140,12 +140,11 @@ class BarriersTab:
             return
         for grip, x, y in zip(self._grips, new["x"], new["y"], strict=False):
             if max(abs(float(x) - grip.x), abs(float(y) - grip.y)) > 1e-9:
-                self._change(
-                    lambda grip=grip, x=x, y=y: placing.dragged(
-                        self.project.site, self.project.layout, grip, float(x), float(y)
-                    ),
-                    f"dragged the {grip.words}",
-                )
+                make = partial(
+                    placing.dragged, self.project.site, self.project.layout, grip, float(x),
+                    float(y),
+                )  # fmt: skip
+                self._change(make, f"dragged the {grip.words}")
                 break
         self._show_grips()
 
@@ -350,7 +349,7 @@ def _money(found: Figures) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return the head and the rows of the table of Z and its parts."""
     c, bare = found.costs, found.bare
     assert c is not None and bare is not None
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, words in (
         ("objective", "Z, all together"),
         ("capital", "capital and upkeep"),

@@ -22,7 +22,7 @@ from rigdda.app.page.section import plain_axes
 from rigdda.app.page.theme import SERIES
 from rigdda.envs import DesignProblem
 from rigdda.fields import described
-from rigdda.model.prices import Consequences, Prices
+from rigdda.ground.prices import Consequences, Prices
 
 if TYPE_CHECKING:
     from rigdda.app.page.page import Page

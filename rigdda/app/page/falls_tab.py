@@ -14,13 +14,13 @@ from bokeh.models import ColumnDataSource, HoverTool, PointDrawTool, Range1d, Ta
 from bokeh.plotting import figure
 
 from rigdda import Error
-from rigdda.agents.reports import simulation_folder, stations
-from rigdda.agents.reports.stations import QUANTITIES, Passing
 from rigdda.app.page.barriers_tab import shown, ways
 from rigdda.app.page.falls import ENDS, Fall, Release, shares
 from rigdda.app.page.forms import button, heading, in_words, paragraph, table
 from rigdda.app.page.section import Section, plain_axes
 from rigdda.app.page.theme import SCALE, SERIES
+from rigdda.app.reports import simulation_folder, stations
+from rigdda.app.reports.stations import QUANTITIES, Passing
 from rigdda.passages import Passages, passages
 
 if TYPE_CHECKING:

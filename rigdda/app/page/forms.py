@@ -132,7 +132,7 @@ def choice(
     return Bound(widget, get, write)
 
 
-def button(label: str, do: Callable[[], None], primary: bool = False, **more: Any) -> Any:
+def button(label: str, do: Callable[[], object], primary: bool = False, **more: Any) -> Any:
     """Return a button."""
     kind = "primary" if primary else "default"
     found = pn.widgets.Button(name=label, button_type=kind, **({"margin": (4, 8)} | more))

@@ -218,8 +218,8 @@ def _tried(row: dict[str, Any]) -> Tried:
     tables = json.loads(row["barriers"])
     layout = tuple(from_table(f"barriers[{i}]", table) for i, table in enumerate(tables))
     risk = float(row["harm"]) + float(row["repair"])
-    numbers = (row["objective"], row["objective_low"], row["objective_high"], row["capital"])
+    z, low, high = (float(row[f"objective{end}"]) for end in ("", "_low", "_high"))
     return Tried(
-        layout, row["stage"], int(row["simulations"]), int(row["releases"]), *map(float, numbers),
-        risk, float(row["cost"]),
+        layout, row["stage"], int(row["simulations"]), int(row["releases"]), z, low, high,
+        float(row["capital"]), risk, float(row["cost"]),
     )  # fmt: skip

@@ -19,10 +19,10 @@ import numpy as np
 
 import rigdda
 from rigdda import Error, Layout, Outcome, Site
-from rigdda.agents.barrier_checks import LayoutChecks, check_layout
-from rigdda.agents.reports import study_report
-from rigdda.agents.reports.study_report import StudiedLayout, StudyResults
+from rigdda.app.barrier_checks import LayoutChecks, check_layout
 from rigdda.app.page.placing import kinds_for
+from rigdda.app.reports import study_report
+from rigdda.app.reports.study_report import StudiedLayout, StudyResults
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem
 from rigdda.envs.cost import Account, account, learn
@@ -118,11 +118,13 @@ def results_of(site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Out
 def _joined(parts: list[Account]) -> Account:
     """Return the account of several accounts one after another."""
     tolls = [part.toll for part in parts if part.toll is not None]
-    return Account(
-        *(np.concatenate([getattr(part, name) for part in parts])
-          for name in ("event", "harm", "repair", "volume", "reached", "failed")),
-        toll=np.concatenate(tolls) if tolls else None,
-    )  # fmt: skip
+
+    def column(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    names = ("event", "harm", "repair", "volume", "reached", "failed")
+    toll = np.concatenate(tolls) if tolls else None
+    return Account(**{name: column(name) for name in names}, toll=toll)
 
 
 class Figures(NamedTuple):

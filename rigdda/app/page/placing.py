@@ -20,7 +20,7 @@ STEP = 0.1
 class Grip(NamedTuple):
     """A handle of a barrier in the section."""
 
-    index: int
+    place: int
     """Place of the barrier in the layout."""
     field: str
     """The field that it changes."""
@@ -153,7 +153,7 @@ def dragged(site: Site, layout: Layout, grip: Grip, x: float, y: float) -> Layou
     BadInput
         If the barrier cannot have the size that results.
     """
-    barrier = layout[grip.index]
+    barrier = layout[grip.place]
     match grip.field:
         case "x":
             value = x
@@ -168,4 +168,4 @@ def dragged(site: Site, layout: Layout, grip: Grip, x: float, y: float) -> Layou
         row = FENCE_CLASSES[barrier.energy_class]
         value = min(max(value, row.lowest), row.height)
     changed = with_field(barrier, grip.field, value)
-    return tuple(changed if i == grip.index else b for i, b in enumerate(layout))
+    return tuple(changed if i == grip.place else b for i, b in enumerate(layout))

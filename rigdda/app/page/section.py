@@ -12,8 +12,8 @@ from bokeh.models import ColumnDataSource, HoverTool, Range1d
 from bokeh.plotting import figure
 
 from rigdda import BadInput, Layout, Site
-from rigdda.agents.reports.pictures import sources
 from rigdda.app.page.theme import Theme
+from rigdda.app.reports.pictures import sources
 from rigdda.barriers import Earthwork, earthworks
 from rigdda.model.survey import spikes
 

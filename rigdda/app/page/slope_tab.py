@@ -14,11 +14,11 @@ import panel as pn
 from bokeh.models import ColumnDataSource, HoverTool, PointDrawTool
 
 from rigdda import BadInput, Site
-from rigdda.agents import new_site, site_check
+from rigdda.app import new_site, site_check
 from rigdda.app.page import edits
 from rigdda.app.page.forms import Bound, button, choice, heading, number, text
 from rigdda.app.page.section import Section
-from rigdda.model.grounds import GROUNDS
+from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import spikes
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def handles(site: Site) -> list[Handle]:
     for i, source in enumerate(site.sources):
         if source.band is not None:
             for k, end in enumerate(("upper", "lower")):
-                path = ("sources", i, "band", k)
+                path: Path_ = ("sources", i, "band", k)
                 found.append(Handle(f"{end} end of {source.name}", source.band[k], path))
     for table, words, place in (
         ("road", "of the road", site.road),
@@ -75,7 +75,7 @@ class SlopeTab:
         self.section = Section(self.theme, "Section of the slope", coordinates=True)
         self._showing = False
         self._handles: list[Handle] = []
-        self._bound: list[Bound] = []
+        self._bound: list[Bound | Words] = []
         self._structure: Any = None
         self._places = ColumnDataSource({"x": [], "y": [], "words": []})
         self._points = ColumnDataSource({"x": [], "y": []})
@@ -349,7 +349,7 @@ class SlopeTab:
         return [pn.Row(*(one.widget for one in volumes)), pn.Row(*shape)]
 
     def _set_period(self, i: int, years: float) -> None:
-        values = {
+        values: dict[Path_, Any] = {
             ("events", i, "rate"): None,
             ("events", i, "section_length"): None,
             ("events", i, "return_period"): years,
@@ -359,7 +359,7 @@ class SlopeTab:
     def _set_volume(self, i: int, k: int, volume: float) -> None:
         both = [_volume(self.project, i, j) for j in (0, 1)]
         both[k] = volume
-        values = {("events", i, "area"): None, ("events", i, "volume"): both}
+        values: dict[Path_, Any] = {("events", i, "area"): None, ("events", i, "volume"): both}
         self._change(values, "set the volume of blocks")
 
     def _change(self, values: dict[Path_, Any], words: str) -> None:

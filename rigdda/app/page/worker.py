@@ -29,7 +29,7 @@ def _watch() -> None:
 def main() -> int:
     """Run the command and return its exit code."""
     threading.Thread(target=_watch, name="server", daemon=True).start()
-    from rigdda.agents.cli import main as command
+    from rigdda.app.cli import main as command
 
     return command(sys.argv[1:])
 

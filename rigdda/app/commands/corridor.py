@@ -1,0 +1,103 @@
+"""The command `rigdda corridor`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from rigdda.agents.limits import SEED
+from rigdda.app.terminal import (
+    RealNumber,
+    checks_option,
+    count_option,
+    executor_option,
+    finding,
+    folder_for,
+    out_option,
+    progress,
+    recorded_run,
+    seed_option,
+    show,
+)
+
+if TYPE_CHECKING:
+    pass
+
+
+@click.command()
+@click.argument("file", metavar="CORRIDOR")
+@click.option("--budget", "budgets", type=RealNumber(0.0, 1e12), multiple=True, metavar="EUR",
+              help="Budget for construction. May be repeated.  [default: those of the "
+              "file]")  # fmt: skip
+@count_option("--releases", 200, 4_000, "Number of releases per section.")
+@click.option("--robust", is_flag=True, help="Choose by the mean of the highest fifth of the "
+              "estimates of the cost (conditional value at risk).")  # fmt: skip
+@checks_option
+@seed_option("Seed of the searches and of their releases.", SEED)
+@out_option("corridor-NAME")
+@executor_option
+def corridor(
+    file: str,
+    budgets: tuple[float, ...],
+    releases: int,
+    robust: bool,
+    checks: str,
+    seed: int,
+    out: Path | None,
+) -> None:
+    """Choose the barriers of all sections of CORRIDOR within a common budget.
+
+    CORRIDOR is a TOML file or a built-in corridor (corridor-12, corridor-50). Every section is
+    searched for layouts from the cheapest to the best, and an integer programme chooses one layout
+    for each section and budget. The choice is compared with the same money for every metre of road,
+    with the worst section first and with the greatest saving per cost.
+
+    Writes budgets.csv, sections.csv, fronts.csv (all layouts), priorities.csv (what should be built
+    next), the folder layouts, and pictures: gain.png (gain against budget) and strip.png (what is
+    built where). An interrupted run continues where it stopped.
+    """
+    from msgspec.structs import replace
+
+    import rigdda
+    from rigdda.agents.corridor.planning import Planner
+    from rigdda.app.released import released
+    from rigdda.app.reports import corridor_folder as report
+    from rigdda.envs import CorridorProblem
+
+    where = rigdda.Corridor.load(file)
+    sections = tuple(replace(section, site=released(section.site)) for section in where.sections)
+    where = replace(where, sections=sections)
+    if budgets:
+        where = replace(where, budgets=budgets)
+    problem = CorridorProblem(where, checks=checks)
+    folder = folder_for(out, f"corridor-{where.name}", *report.FILES)
+    stored = folder / "evaluations"
+    stored.mkdir(exist_ok=True)
+    with recorded_run(folder), progress(releases * len(where.sections)) as tick:
+        plan = Planner(problem, releases, seed, robust, stored, tick).plan()
+        report.write(plan, folder)
+    click.echo(
+        "Costs in thousand EUR, savings in thousand EUR per year. share: saving over that of\n"
+        "unlimited money; same, worst and ratio: the same share with equal money for every\n"
+        "metre, with the worst section first, and with the greatest saving per cost first;\n"
+        "1 EUR: what one more EUR would save each year."
+    )
+    show(report.table_of_budgets(plan))
+    own = report.shown_budget(plan)
+    click.echo(
+        f"what a budget of {own.budget:,.0f} EUR builds; next: what comes first if there is more\n"
+        "money, see priorities.csv"
+    )
+    show(report.table_of_sections(plan, own))
+    for one in plan.plans[:-1]:
+        if missing := report.sections_that_miss(plan, one):
+            finding(
+                f"with {one.budget:,.0f} EUR, these sections may miss a target: "
+                f"{', '.join(missing)}"
+            )
+    click.echo(
+        f"{len(where.sections)} sections, {where.length:,.0f} m, {plan.releases:,} releases; "
+        f"{', '.join(report.FILES)} and layouts are in {folder}"
+    )

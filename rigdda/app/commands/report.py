@@ -1,0 +1,50 @@
+"""The command `rigdda report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from rigdda.app.terminal import (
+    Folder,
+    folder_for,
+)
+
+if TYPE_CHECKING:
+    pass
+
+
+@click.command()
+@click.argument("results", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", type=Folder(file_okay=False, path_type=Path),
+              help="Folder to write into.  [default: the first of RESULTS]")  # fmt: skip
+@click.option("--pdf", is_flag=True, help="Print the report to report.pdf as well. Needs Chromium, "
+              "Chrome or Edge.")  # fmt: skip
+@click.option("--serve", is_flag=True, help="Serve the report on this machine beside the replay "
+              "of RESULTS, which begins at the first impact. Ctrl-C ends it.")  # fmt: skip
+def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) -> None:
+    """Write one report of results folders: report.html.
+
+    RESULTS are folders that design, simulate, study, reprice, check, fit, sensitivity or corridor
+    wrote. The page needs no other file and no network, and it prints on A4: a summary, the site,
+    the assumptions with their sources, what comes down, the layouts compared, the limits of the
+    method, and the commands, seeds and versions to repeat the results.
+    """
+    from rigdda.app import browser
+    from rigdda.app.reports import report_page, results_folder
+
+    folders = results_folder.open_all(results)
+    program = browser.find() if pdf else None
+    replay = results_folder.replay_of(folders) if serve else None
+    page = report_page.compose(folders)
+    files = (report_page.FILE, "report.pdf") if pdf else (report_page.FILE,)
+    file = report_page.write(page, folder_for(out or results[0], "", *files))
+    click.echo(file)
+    if program is not None:
+        click.echo(browser.print_pdf(program, file))
+    if replay is not None:
+        from rigdda.app.report_server import serve as show_both
+
+        show_both(file, replay, click.echo)

@@ -1,0 +1,74 @@
+"""The command `rigdda study`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from rigdda.app.terminal import (
+    TRAFFIC,
+    executor_option,
+    finding,
+    folder_for,
+    note,
+    out_option,
+    progress,
+    recorded_run,
+    seed_option,
+    show,
+)
+
+if TYPE_CHECKING:
+    pass
+
+
+@click.command()
+@click.argument("file", metavar="STUDY.toml")
+@seed_option("Seed of the first release. Later releases use the seeds that follow.")
+@out_option("study-NAME")
+@executor_option
+def study(file: str, seed: int, out: Path | None) -> None:
+    """Compare the layouts of STUDY.toml on the same releases.
+
+    The file gives a `site`, the number of `releases` of each event, and `layouts`. Each layout has
+    a `name` and either `barriers`, as in a layout file, or the name of a layout `file`.
+
+    Writes study.csv (one row for each release), layouts.csv (Z and its parts), events.csv
+    (probabilities and energies), differences.csv (of each pair of layouts, on common releases),
+    sections.png, costs.png and, of a site with traffic, risk.csv. An interrupted study continues
+    from study.csv.
+    """
+    from dataclasses import replace
+
+    from rigdda.app import studies
+    from rigdda.app.released import released
+    from rigdda.app.reports import findings, study_report
+
+    asked = studies.load(file)
+    asked = replace(asked, site=released(asked.site))
+    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.FILES)
+    with recorded_run(folder, asked.site), progress(asked.size) as tick:
+        resumed = studies.run(asked, seed, folder / "study.csv", tick)
+        tick(asked.size, "tables and pictures")
+        found = studies.results(asked, folder / "study.csv")
+        study_report.write(folder, found, seed)
+    click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
+    show(study_report.costs(found))
+    click.echo(
+        "probabilities with 95 % upper bounds in brackets; largest energies on the road and of a\n"
+        "hit: 95 % quantiles of the releases with one, in kJ per metre of width"
+    )
+    show(study_report.events(found))
+    risks = study_report.risks(found)
+    if risks is not None:
+        click.echo(TRAFFIC.format(asked.site.traffic))
+        show(risks)
+    for line in study_report.sentences(found):
+        finding(line)
+    for name, layout in asked.layouts.items():
+        if words := findings.unbuildable(asked.site, layout):
+            note(f"the layout {name!r} {words}")
+    words = f", {resumed} from an earlier run" if resumed else ""
+    click.echo(f"{asked.size:,} releases{words}; tables and pictures are in {folder}")

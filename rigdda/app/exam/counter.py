@@ -1,0 +1,159 @@
+"""The scorer's side of a task: it simulates the requested releases, counts and limits them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+
+from rigdda import BadInput, Error, Layout, check
+from rigdda.agents.designers import catalogue
+from rigdda.agents.designers.store import Store, StoredEvaluation
+from rigdda.agents.limits import SEED
+from rigdda.app.exam.messages import (
+    AnyReply,
+    BatchReply,
+    CrossingsReply,
+    CrossingsRequest,
+    EvaluateRequest,
+    RefusedReply,
+    Request,
+    SampleRequest,
+    Tables,
+    TaskOrder,
+)
+from rigdda.app.exam.task import Task
+from rigdda.barriers import from_table
+from rigdda.envs import DesignProblem, Evaluation
+
+COUNT = "its counter says {told:,} releases, but the scorer counted {used:,}"
+"""Reason for a flag."""
+
+
+class ReleaseCounter:
+    """Simulates releases of a task for an entry, and counts them.
+
+    Parameters
+    ----------
+    problems : sequence of DesignProblem
+        The problems of the sections.
+    budget : int
+        Largest number of releases of all sections together.
+
+    Attributes
+    ----------
+    used, refused : int
+        Number of releases simulated so far, and number of requests that were refused because they
+        exceeded the budget.
+    flags : list of str
+        Rules that the entry broke.
+    """
+
+    def __init__(self, problems: Sequence[DesignProblem], budget: int):
+        self.problems, self.budget = tuple(problems), budget
+        self.used = self.refused = 0
+        self.flags: list[str] = []
+        self._store = Store()
+
+    def flag(self, reason: str) -> None:
+        """Record that the entry broke a rule."""
+        if reason not in self.flags:
+            self.flags.append(reason)
+
+    def compare(self, told: int) -> None:
+        """Flag the entry if its own count differs."""
+        if told != self.used:
+            self.flag(COUNT.format(told=told, used=self.used))
+
+    def ask(self, request: Request) -> AnyReply:
+        """Return the reply to a request; a refusal says what is wrong."""
+        self.compare(request.used)
+        try:
+            return self._answer(request)
+        except BadInput as bad:
+            return RefusedReply(bad.field, str(bad.value), bad.mend)
+        except (Error, msgspec.MsgspecError) as error:
+            return RefusedReply("request", type(error).__name__, str(error))
+
+    def _answer(self, request: Request) -> AnyReply:
+        """Return the reply to a request, whose releases count if they were simulated."""
+        place = check.integer("section", request.section, 0, len(self.problems) - 1)
+        problem = self.problems[place]
+        reply: AnyReply
+        if isinstance(request, EvaluateRequest):
+            count = self._afford(len(request.seeds))
+            layout = problem.check(from_tables(request.layout))
+            found = self._store.evaluate(problem, layout, request.seeds)
+            reply = BatchReply(StoredEvaluation(_bare(found), {}))
+        elif isinstance(request, SampleRequest):
+            count = self._afford(sum(map(len, request.seeds.values())))
+            layout = problem.check(from_tables(request.layout))
+            batch = self._store.sample(problem, layout, request.seeds)
+            reply = BatchReply(StoredEvaluation(_bare(batch.evaluation), batch.releases))
+        else:
+            assert isinstance(request, CrossingsRequest)
+            count = self._afford(sum(map(len, request.seeds.values())))
+            ensemble = catalogue.ensemble(problem.site, request.seeds, np.array(request.stations))
+            table = np.ascontiguousarray(ensemble.crossings).tobytes()
+            reply = CrossingsReply(table, ensemble.event.tolist(), ensemble.width.tolist())
+        self.used += count
+        return reply
+
+    def _afford(self, releases: int) -> int:
+        """Return a number of releases if so many are left."""
+        left = self.budget - self.used
+        if releases > left:
+            self.refused += 1
+            mend = f"ask for at most the {left:,} that are left of {self.budget:,}"
+            raise BadInput("releases", releases, mend)
+        return releases
+
+
+def _bare(evaluation: Evaluation) -> Evaluation:
+    """Return an evaluation without what the entry knows and without the outcomes."""
+    return replace(evaluation, layout=(), seeds=(), outcomes=())
+
+
+def from_tables(tables: Tables) -> Layout:
+    """Return the layout of the tables of a layout file.
+
+    Raises
+    ------
+    BadInput
+        If a table is invalid.
+    """
+    return tuple(from_table(f"layout[{i}]", table) for i, table in enumerate(tables))
+
+
+def problems_of(order: TaskOrder) -> tuple[DesignProblem, ...]:
+    """Return the problems of the sections of a task."""
+    return tuple(DesignProblem(site, order.max_barriers) for site in order.sites)
+
+
+def practice(site: str, budget: int = 500, seed: int = 0, max_barriers: int = 3) -> Task:
+    """Return a task on any site for the development of an entry, as the exam would pose it.
+
+    The releases are simulated in this process.
+
+    Parameters
+    ----------
+    site : str
+        Name of a site, for example of the split "validation", or a TOML file.
+    budget : int
+        Number of releases.
+    seed : int
+        Seed of the task.
+    max_barriers : int
+        Largest number of barriers.
+
+    Raises
+    ------
+    BadInput
+        If there is no such site, or a number is outside its range.
+    """
+    problem = DesignProblem(site, max_barriers)
+    releases = check.integer("budget", budget, 0)
+    counter = ReleaseCounter([problem], releases)
+    return Task(problem, str(site), releases, check.integer("seed", seed, 0, SEED), counter)

@@ -1,0 +1,504 @@
+"""The scorer: it runs an entry in processes of its own and verifies what the entry submits.
+
+For each budget and seed a new process plays all sites and corridors, in the order of the budgets.
+When all layouts of a budget are fixed, the seeds of their verification follow from a hash of them.
+The layouts and the references are evaluated on the same releases.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.machinery
+import math
+import multiprocessing
+import os
+import resource
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from rigdda import MECHANICS, BadInput, Layout, __version__, check
+from rigdda.agents.designers import rule
+from rigdda.agents.designers.store import Store
+from rigdda.agents.limits import SEED
+from rigdda.app.exam import entrant
+from rigdda.app.exam.counter import ReleaseCounter, from_tables, problems_of
+from rigdda.app.exam.messages import (
+    FailRequest,
+    FlagRequest,
+    Request,
+    SubmitRequest,
+    Tables,
+    TaskOrder,
+    decode_request,
+    encode,
+)
+from rigdda.app.exam.specification import References, Specification
+from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.observation import observe
+from rigdda.files import atomic
+
+Tick = Callable[[int, str], None]
+
+SUBMISSIONS, IDENTITY, EVALUATIONS = "submissions.json", "exam.json", "evaluations.jsonl"
+"""Files of a run from which it continues."""
+
+TOLERANCE = 1e-6
+"""Relative tolerance of the construction cost of a corridor."""
+
+
+class ExamPart(msgspec.Struct, frozen=True):
+    """The part of an exam that is played.
+
+    Parameters
+    ----------
+    specification : Specification
+        The exam.
+    sites, corridors : int
+        Number of sites and of corridors, the first ones.
+    budgets : tuple of int
+        Releases per section.
+    verification : int
+        Releases of each layout.
+    seed : int
+        Seed of the tasks.
+    """
+
+    specification: Specification
+    sites: int
+    corridors: int
+    budgets: tuple[int, ...]
+    verification: int
+    seed: int
+
+    @property
+    def complete(self) -> bool:
+        """Whether the results may enter the leaderboard: nothing but budgets is left out."""
+        whole = self.specification
+        return (
+            whole.current
+            and self.sites == len(whole.sites)
+            and self.corridors == len(whole.corridors)
+            and set(self.budgets) <= set(whole.budgets)
+            and self.verification >= whole.verification
+        )
+
+    def orders(self, budget: int) -> list[TaskOrder]:
+        """Return the tasks with a budget."""
+        whole, most = self.specification, self.specification.max_barriers
+        found = [
+            TaskOrder(site, [site], [1.0], None, most, budget, self.seed)
+            for site in whole.sites[: self.sites]
+        ]
+        for corridor in whole.corridors[: self.corridors]:
+            money = corridor.money * sum(corridor.lengths)
+            lists = list(corridor.sites), list(corridor.lengths)
+            found.append(TaskOrder(corridor.name, *lists, money, most, budget, self.seed))
+        return found
+
+    @property
+    def size(self) -> int:
+        """Number of tasks."""
+        return len(self.budgets) * (self.sites + self.corridors)
+
+
+def part(
+    specification: Specification,
+    sites: int | None = None,
+    corridors: int | None = None,
+    budgets: Sequence[int] = (),
+    verification: int | None = None,
+    seed: int = 0,
+) -> ExamPart:
+    """Return a part of an exam, by default all of it.
+
+    If only `sites` is given, no corridor is played.
+
+    Raises
+    ------
+    BadInput
+        If a number is outside its range.
+    """
+    most = len(specification.sites), len(specification.corridors)
+    count = most[0] if sites is None else check.integer("sites", sites, 1, most[0])
+    usual = most[1] if sites is None else 0
+    roads = usual if corridors is None else check.integer("corridors", corridors, 0, most[1])
+    asked = sorted({check.integer("budget", b, 0) for b in budgets or specification.budgets})
+    drawn = specification.verification if verification is None else verification
+    return ExamPart(
+        specification, count, roads, tuple(asked), check.integer("verify", drawn, 10),
+        check.integer("seed", seed, 0, SEED),
+    )  # fmt: skip
+
+
+def check_references(asked: ExamPart, references: References) -> None:
+    """Check that there is a reference for each task.
+
+    Raises
+    ------
+    BadInput
+        If one is missing, or random layouts are as good as it.
+    """
+    for order in asked.orders(asked.budgets[0]):
+        anchor = references.anchors.get(order.name)
+        if anchor is None or not anchor.reference < min(anchor.random, anchor.nothing):
+            mend = "record one that is better: python -m experiments.exam_reference"
+            raise BadInput("references", order.name, mend)
+
+
+class Submission(msgspec.Struct, frozen=True):
+    """What an entry submitted for a task.
+
+    Parameters
+    ----------
+    name : str
+        Name of the site or corridor.
+    budget : int
+        Releases per section that the entry was given.
+    layouts : list of layouts
+        One for each section, as the tables of layout files; empty if what was submitted is invalid.
+    used, refused : int
+        Number of releases simulated, and number of requests beyond the budget.
+    flags : list of str
+        Rules that the entry broke.
+    seconds : float
+        Processor time of the entry's process, without the simulations of the scorer [s]; that of
+        all tasks of a process is divided evenly.
+    """
+
+    name: str
+    budget: int
+    layouts: list[Tables]
+    used: int
+    refused: int
+    flags: list[str]
+    seconds: float = 0.0
+
+    def built(self) -> tuple[Layout, ...]:
+        """Return the layouts."""
+        return tuple(from_tables(own) for own in self.layouts)
+
+
+@dataclass(frozen=True, slots=True)
+class ExamScore:
+    """Result of a task.
+
+    Parameters
+    ----------
+    submission : Submission
+        What was submitted.
+    corridor : bool
+        Whether the task is a corridor.
+    evaluations, references : tuple of Evaluation
+        Evaluations of the submitted layouts and of the reference, of each section, on the same
+        releases.
+    lengths : tuple of float
+        Lengths of the sections [m]; 1 for a site.
+    score : float
+        1 - (Z - Z_reference) / (Z_random - Z_reference) [-]: 1 for the reference, 0 for random
+        layouts. The numerator is measured on the same releases, the denominator is recorded.
+    distance : float
+        (Z - Z_reference) / (Z_nothing - Z_reference) [-]: 0 for the reference, 1 for no barriers.
+    """
+
+    submission: Submission
+    corridor: bool
+    evaluations: tuple[Evaluation, ...]
+    references: tuple[Evaluation, ...]
+    lengths: tuple[float, ...]
+    score: float
+    distance: float
+
+    @property
+    def objective(self) -> float:
+        """Annual cost [EUR per metre and year] of a site, or [EUR/year] of a corridor."""
+        return _total(self.lengths, self.evaluations)
+
+    @property
+    def cost(self) -> float:
+        """Construction cost [EUR per metre] of a site, or [EUR] of a corridor."""
+        pairs = zip(self.lengths, self.evaluations, strict=True)
+        return math.fsum(length * e.cost for length, e in pairs)
+
+
+def _total(lengths: Sequence[float], found: Sequence[Evaluation]) -> float:
+    """Return the sum of length times Z."""
+    return math.fsum(at * e.objective for at, e in zip(lengths, found, strict=True))
+
+
+class Scorer:
+    """Runs an entry and scores it.
+
+    Parameters
+    ----------
+    asked : ExamPart
+        The part of the exam.
+    references : References
+        The recorded references.
+    entry, corridor_entry : str
+        Names of the functions, "package.module:function". The second may be empty.
+    folder : path
+        Folder of the run, from which it continues.
+    secrets : sequence of path
+        Files that the entry must not open, besides those of the run.
+    tick : callable
+        Called with the number of completed tasks and a description.
+    """
+
+    def __init__(
+        self,
+        asked: ExamPart,
+        references: References,
+        entry: str,
+        corridor_entry: str,
+        folder: Path,
+        secrets: Sequence[Path],
+        tick: Tick = lambda done, words: None,
+    ):
+        self.asked, self.references, self.folder, self.tick = asked, references, folder, tick
+        self.entry, self.corridor_entry = entry, corridor_entry
+        own = (folder / name for name in (SUBMISSIONS, IDENTITY, EVALUATIONS))
+        self._secrets = tuple(str(path) for path in (*secrets, *own))
+        self._store = Store(folder / EVALUATIONS)
+        self._done: dict[tuple[str, int], Submission] = {}
+
+    def run(self) -> list[ExamScore]:
+        """Return the scores of all tasks.
+
+        Raises
+        ------
+        BadInput
+            If the folder belongs to another run, the entry cannot be imported, raises an error or
+            ends its process.
+        """
+        self.play()
+        return self.verify()
+
+    def play(self) -> None:
+        """Let the entry play all tasks that it has not played.
+
+        Raises
+        ------
+        BadInput
+            As `run` does.
+        """
+        self._check_folder()
+        for budget in self.asked.budgets:
+            self._play(budget)
+
+    def _check_folder(self) -> None:
+        """Read what the folder has of this run, and note to which run it belongs."""
+        names = self.entry, self.corridor_entry
+        code = [source_hash_of(name) for name in names if name]
+        own = [self.asked.specification.key, self.asked.seed, *names, *code, MECHANICS]
+        file, identity = (
+            self.folder / IDENTITY,
+            {"run": msgspec.json.encode([__version__, *own]).decode()},
+        )
+        if file.is_file() and _decoded(file, dict[str, str]) != identity:
+            mend = "it contains an exam of another entry, source file, seed or version: "
+            mend += "name another folder"
+            raise BadInput("--out", str(self.folder), mend)
+        with atomic(file) as fresh:
+            fresh.write_bytes(msgspec.json.encode(identity))
+        known = self.folder / SUBMISSIONS
+        if known.is_file():
+            rows = _decoded(known, list[Submission])
+            self._done = {(row.name, row.budget): row for row in rows}
+
+    def _keep(self, submission: Submission) -> None:
+        self._done[submission.name, submission.budget] = submission
+        with atomic(self.folder / SUBMISSIONS) as fresh:
+            fresh.write_bytes(msgspec.json.encode(list(self._done.values())))
+
+    def _play(self, budget: int) -> None:
+        """Let the entry play all tasks with a budget that have not been played."""
+        orders = [o for o in self.asked.orders(budget) if (o.name, budget) not in self._done]
+        if not orders:
+            return
+        for order in orders:
+            for problem in problems_of(order):
+                self.tick(len(self._done), f"{order.name}: releases without barriers")
+                prepare(problem)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        played = []
+        with _process(self.entry, self.corridor_entry, self._secrets) as pipe:
+            for order in orders:
+                self.tick(len(self._done), f"{order.name}: {budget:,} releases")
+                played.append(self._task(pipe, order))
+                self._keep(played[-1])
+            pipe.send_bytes(b"")
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        for one in played:
+            self._keep(msgspec.structs.replace(one, seconds=round(seconds / len(played), 3)))
+
+    def _task(self, pipe: Connection, order: TaskOrder) -> Submission:
+        """Return what the entry submits for a task."""
+        problems = problems_of(order)
+        counter = ReleaseCounter(problems, order.budget * len(problems))
+        try:
+            pipe.send_bytes(encode(order))
+            while True:
+                request = decode_request(pipe.recv_bytes())
+                if isinstance(request, Request):
+                    pipe.send_bytes(encode(counter.ask(request)))
+                elif isinstance(request, FlagRequest):
+                    counter.flag(request.reason)
+                elif isinstance(request, FailRequest):
+                    raise BadInput("--entry", self.entry, request.error)
+                else:
+                    return _submission(order, problems, counter, request)
+        except (EOFError, ConnectionError, OSError):
+            mend = f"its process ended on {order.name}: return a layout instead"
+            raise BadInput("--entry", self.entry, mend) from None
+        except msgspec.MsgspecError as error:
+            mend = f"it sent an unknown request: use the methods of the task ({error})"
+            raise BadInput("--entry", self.entry, mend) from None
+
+    def seeds(self, name: str, budget: int, chosen: int = 0) -> list[int]:
+        """Return the seeds of the verification of a task.
+
+        They follow from all layouts that were submitted with the same budget.
+
+        Parameters
+        ----------
+        name : str
+            Name of the site or corridor.
+        budget : int
+            Releases per section that the entry was given.
+        chosen : int
+            Number of the set of releases. The exam uses set 0; others show how far the scores
+            depend on the releases.
+        """
+        fixed = [self._done[order.name, budget].layouts for order in self.asked.orders(budget)]
+        text = msgspec.json.encode([self.asked.specification.key, fixed, name, budget, chosen])
+        words = np.frombuffer(hashlib.sha256(text).digest(), dtype=np.uint32)
+        drawn = np.random.SeedSequence(words.tolist())
+        return drawn.generate_state(self.asked.verification, np.uint64).tolist()
+
+    def verify(self, chosen: int = 0) -> list[ExamScore]:
+        """Return the scores of the submitted layouts on a set of releases, see `seeds`."""
+        orders = [order for budget in self.asked.budgets for order in self.asked.orders(budget)]
+        found = []
+        for order in orders:
+            self.tick(len(self._done), f"{order.name}: verification")
+            found.append(self._score(order, chosen))
+        return found
+
+    def _score(self, order: TaskOrder, chosen: int) -> ExamScore:
+        row = self._done[order.name, order.budget]
+        anchor = self.references.anchors[order.name]
+        problems, seeds = problems_of(order), self.seeds(order.name, order.budget, chosen)
+        layouts = row.built() or ((),) * len(problems)  # an invalid submission builds nothing
+        built, best = (
+            tuple(
+                self._store.evaluate(problem, layout, seeds)
+                for problem, layout in zip(problems, own, strict=True)
+            )
+            for own in (layouts, anchor.built())
+        )
+        lengths = tuple(order.lengths)
+        behind = _total(lengths, built) - _total(lengths, best)
+        return ExamScore(
+            row, order.money is not None, built, best, lengths,
+            1.0 - behind / (anchor.random - anchor.reference),
+            behind / (anchor.nothing - anchor.reference),
+        )  # fmt: skip
+
+
+def prepare(problem: DesignProblem) -> None:
+    """Compute and store the statistics of a site without barriers, which cost no releases."""
+    observe(problem)
+    rule.answer(problem)
+
+
+def _submission(
+    order: TaskOrder,
+    problems: Sequence[DesignProblem],
+    counter: ReleaseCounter,
+    request: SubmitRequest,
+) -> Submission:
+    """Return a checked submission; one that cannot be built is flagged and has no layouts."""
+    counter.compare(request.used)
+    layouts: list[Tables] = []
+    try:
+        if request.wrong:
+            raise BadInput("layout", request.wrong, "return a layout")
+        if len(request.layouts) != len(problems):
+            raise BadInput("layouts", len(request.layouts), f"return {len(problems)}")
+        cost = 0.0
+        for at, problem, own in zip(order.lengths, problems, request.layouts, strict=True):
+            cost += at * problem.site.capital(problem.check(from_tables(own)))
+        if order.money is not None and cost > order.money * (1.0 + TOLERANCE):
+            mend = f"spend at most {order.money:,.0f} EUR"
+            raise BadInput("layouts", f"{cost:,.0f} EUR", mend)
+        layouts = request.layouts
+    except (BadInput, TypeError) as bad:
+        counter.flag(f"submitted what cannot be built: {' '.join(str(bad).split())}")
+    return Submission(
+        order.name, order.budget, layouts, counter.used, counter.refused, counter.flags
+    )
+
+
+def _decoded(file: Path, of: type[Any]) -> Any:
+    """Return the content of a JSON file of an exam.
+
+    Raises
+    ------
+    BadInput
+        If the file is damaged.
+    """
+    try:
+        return msgspec.json.decode(file.read_bytes(), type=of)
+    except msgspec.MsgspecError as error:
+        mend = f"this is damaged: remove the exam in its folder, or name another folder ({error})"
+        raise BadInput("exam", str(file), mend) from None
+
+
+@contextmanager
+def _process(entry: str, corridor_entry: str, secrets: tuple[str, ...]) -> Iterator[Connection]:
+    """Start a process of an entry and yield the connection to it."""
+    spawn = multiprocessing.get_context("spawn")
+    pipe, other = spawn.Pipe()
+    child = spawn.Process(target=entrant.run, args=(other, entry, corridor_entry, secrets))
+    child.start()
+    other.close()
+    try:
+        yield pipe
+    except BaseException:
+        child.kill()
+        raise
+    finally:
+        child.join()
+        pipe.close()
+
+
+def source_hash_of(entry: str) -> str:
+    """Return a hash of the file of an entry, which is found without importing it.
+
+    Raises
+    ------
+    BadInput
+        If the name has another form than "package.module:function", or there is no such module.
+    """
+    if not entry.partition(":")[2]:
+        raise BadInput("--entry", entry, "give package.module:function")
+    names = entry.partition(":")[0].split(".")
+    places: Sequence[str] | None = [os.getcwd(), *sys.path]
+    for i, _ in enumerate(names):
+        spec = importlib.machinery.PathFinder.find_spec(".".join(names[: i + 1]), places)
+        if spec is None:
+            mend = "name package.module:function of a module in this folder or an installed one"
+            mend += ", without .py" if entry.partition(":")[0].endswith(".py") else ""
+            raise BadInput("--entry", entry, mend)
+        places = spec.submodule_search_locations
+    file = Path(spec.origin or "") if spec is not None else Path()
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:16] if file.is_file() else ""

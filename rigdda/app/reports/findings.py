@@ -1,0 +1,377 @@
+"""Findings of a design in words: its limits, failures of barriers and undecided targets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rigdda import BadInput, Layout, Mesh, Site
+from rigdda.agents.designers.frontier import TriedLayout
+from rigdda.agents.designers.protocol import DesignResult
+from rigdda.app.barrier_checks import LayoutChecks
+from rigdda.app.design_study import ComparedLayouts, DesignStudy, design_events
+from rigdda.app.reports.headline import DesignAnswer, FailedCheck, failed_words
+from rigdda.app.reports.wording import at_most, before, euros, order, percent, percentage, span
+from rigdda.barriers import KINDS
+from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.problem import MET, MISSED, UNDECIDED, Targets
+from rigdda.envs.siting import FeasiblePlaces
+
+
+def unbuildable(site: Site, layout: Layout) -> str:
+    """Return a text with all reasons why a layout may not be built; empty if it may."""
+    found = violations(site, layout)
+    if not found:
+        return ""
+    return f"is simulated as given but may not be built: {'; '.join(map(str, found))}"
+
+
+def violations(site: Site, layout: Layout) -> list[BadInput]:
+    """Return an error for each siting rule that a layout violates."""
+    return list(
+        FeasiblePlaces(site, site.barrier_zone).violations(layout, list(KINDS), len(layout))
+    )
+
+
+def of_layout(site: Site, layout: Layout, event: str | None) -> str:
+    """Return notes on the simulation of a layout; `event` is None if events are drawn by rate."""
+    found = unbuildable(site, layout)
+    words = [f"the layout {found}"] if found else []
+    if event is None and any(isinstance(barrier, Mesh) for barrier in layout):
+        words.append(
+            "mesh makes events rarer but does not change a release: this command draws events by "
+            "their rates without mesh; `design` and `study` take mesh into account"
+        )
+    return "; ".join(words)
+
+
+def existing_barriers(site: Site, layout: Layout) -> list[str]:
+    """Return lines on what happens to the existing barriers of a site with a layout."""
+    stand = site.standing(layout)
+    return [
+        f"existing {barrier.label}, at x = {barrier.x:.1f} m: "
+        + ("kept" if barrier in stand else "removed")
+        for barrier in site.existing_barriers
+    ]
+
+
+def unfitted(site: Site) -> str:
+    """Return a text that names the surfaces with default coefficients of the lumped-mass model."""
+    names = sorted({*site.slope.chain()[1]} - set(site.lumped))
+    if not names:
+        return ""
+    return (
+        f"the rebound from {', '.join(names)} uses default coefficients that were not fitted to "
+        "observations (see [lumped.NAME]); the actual run-outs may be much shorter or longer"
+    )
+
+
+SURE = 0.05
+"""Upper bound of the probability of failure in a design event above which it is reported [-]."""
+
+PART = 1 / 3
+"""Least share of the remaining risk for which an event is named as its cause [-]."""
+
+
+def worst(evaluation: Evaluation) -> str | None:
+    """Return the event with the largest remaining harm and repair, or None if there is none."""
+    left = evaluation.by_event
+    most = max(left, key=lambda name: left[name], default=None)
+    return most if most is not None and left[most] > 0.0 else None
+
+
+def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: str) -> str:
+    """Return one line that says what limits the result.
+
+    Parameters
+    ----------
+    result : DesignResult
+        Result of the designer.
+    cases : sequence of (str, Evaluation)
+        Verified layouts; the first is no barrier, and the last is the layout found.
+    left : str
+        Text on the remaining risk.
+    """
+    chosen = cases[-1][1]
+    parts = [no_layout_pays(result.site, cases)]
+    parts += [_costs_less(name, other, cases[-1]) for name, other in cases[1:-1]]
+    if chosen.layout and result.on_bound:
+        parts.append(f"the layout lies on a bound of the search: {', '.join(result.on_bound)}")
+    return "; ".join(filter(None, [*parts, left]))
+
+
+RANK = {None: 0, MET: 0, UNDECIDED: 1, MISSED: 2}
+"""Ranks of the states of targets, the best first."""
+
+
+def _costs_less(name: str, other: Evaluation, best: tuple[str, Evaluation]) -> str:
+    """Return a text if a layout costs less per year than the last one; otherwise an empty text."""
+    words, chosen = best
+    if not other.ci[1] < chosen.ci[0]:
+        return ""
+    line = f"the layout {name!r} costs less per year than {words!r}"
+    if RANK[other.targets] > RANK[chosen.targets]:
+        return (
+            f"{line}, but its targets are {other.targets}, and those of the latter {chosen.targets}"
+        )
+    if RANK[other.targets] == RANK[MISSED]:
+        return f"{line}, and misses the targets, too"
+    return f"{line}: use a larger --budget"
+
+
+def no_layout_pays(site: Site, cases: Sequence[tuple[str, Evaluation]]) -> str:
+    """Return a text if no layout pays or if this is not shown; otherwise an empty text.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    cases : sequence of (str, Evaluation)
+        Verified layouts; the first is no barrier, and the last is the layout found.
+    """
+    status = "the slope as it stands" if site.existing else "no barrier"
+    nothing, chosen = cases[0][1], cases[-1][1]
+    if chosen.layout:
+        if chosen.ci[1] < nothing.ci[0]:
+            return ""
+        if chosen.ci[0] > nothing.ci[1]:
+            return (
+                f"the layout costs more per year than it saves: Z is {span(chosen.ci)} with it and "
+                f"{span(nothing.ci)} {before(site)}"
+            )
+        return (
+            f"{chosen.releases:,} releases do not show that the layout saves more than it costs: Z "
+            f"is {span(chosen.ci)} with the layout and {span(nothing.ci)} {before(site)}"
+        )
+    lower = [(name, e) for name, e in cases[1:-1] if e.objective < nothing.objective]
+    if not lower:
+        return f"none of the verified layouts costs less per year than {status}"
+    open_ = [name for name, e in lower if e.ci[1] >= nothing.ci[0]]
+    if not open_:
+        return ""  # `limits` names the layouts that cost less
+    names = " and ".join(map(repr, open_))
+    return (
+        f"{names} may cost less per year than {status}, but {nothing.releases:,} releases do "
+        "not show it"
+    )
+
+
+def over_the_cap(problem: DesignProblem, cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
+    """Return lines on the verified layouts that cost more to build than is allowed."""
+    most = problem.max_cost
+    if most is None:
+        return []
+    return [
+        f"{name!r} costs {euros(e.cost)} EUR per metre to build, more than the {euros(most)} that "
+        "may be spent"
+        for name, e in cases[1:]
+        if problem.place.too_expensive(e.layout) is not None
+    ]
+
+
+def frontier(
+    done: ComparedLayouts, front: Sequence[TriedLayout], tried: int, replaced: bool
+) -> list[str]:
+    """Return lines on the frontier of a missed target; empty if there is no frontier.
+
+    Parameters
+    ----------
+    done : ComparedLayouts
+        The compared layouts.
+    front : sequence of TriedLayout
+        The frontier.
+    tried : int
+        Number of layouts among which the frontier was determined.
+    replaced : bool
+        Whether the layout of the search was replaced by one of the frontier.
+    """
+    if not front:
+        return []
+    known = sum(one.verified is not None for one in front)
+    words = "all of them are verified"
+    if known < len(front):
+        verb = "is" if known == 1 else "are"
+        words = f"{known} of its {len(front)} layouts {verb} verified; the others have few releases"
+    least = min(front, key=lambda one: one.level)
+    lines = [
+        f"{_what_missed(done, replaced)}; the table shows the cheapest layout to build for each "
+        f"level of P(reach) among {tried:,} layouts, compared by the upper bound: {words}",
+        f"the lowest upper bound of P(reach) is {at_most(least.level)}, for {euros(least.cost)} "
+        "EUR per metre to build",
+    ]
+    if replaced:
+        lines.append(
+            f"the layout of the search misses the targets by more, or costs more per year; "
+            f"{done.chosen.name!r} was chosen among the verified layouts and verified again on "
+            "other releases"
+        )
+    return lines
+
+
+def _what_missed(done: ComparedLayouts, replaced: bool) -> str:
+    """Return in words which layout missed a target."""
+    met = done.chosen.evaluation.targets != MISSED
+    return "the layout of the search missed a target" if replaced and met else "a target is missed"
+
+
+def cheaper(cases: Sequence[tuple[str, Evaluation]]) -> list[str]:
+    """Return lines on layouts that are cheaper to build and may have the same cost per year.
+
+    Parameters
+    ----------
+    cases : sequence of (str, Evaluation)
+        Verified layouts; the first is no barrier, and the last is the layout found.
+    """
+    words, chosen = cases[-1]
+    return [
+        f"the layout {name!r} may cost as little per year ({span(other.ci)}, {words} "
+        f"{span(chosen.ci)}) and is cheaper to build: {euros(other.cost)} instead of "
+        f"{euros(chosen.cost)} EUR per metre"
+        for name, other in cases[1:-1]
+        if other.ci[0] <= chosen.ci[1] and chosen.ci[0] <= other.ci[1]
+        if other.cost < chosen.cost and euros(other.cost) != euros(chosen.cost)
+        if RANK[other.targets] <= RANK[chosen.targets]
+    ]
+
+
+def of_design(done: DesignStudy) -> list[str]:
+    """Return all lines on the layout of a design, its limits, failures and targets."""
+    chosen = done.chosen.evaluation
+    cases = [(case.name, case.evaluation) for case in done.comparable]
+    lines = [
+        compliance(done),
+        *for_comparison(done),
+        limits(done.result, cases, done.left),
+        *cheaper(cases),
+        *failing(done.problem.site, chosen),
+        undecided(done.problem, chosen),
+    ]
+    return [line for line in lines if line]
+
+
+def compliance(done: DesignStudy) -> str:
+    """Return a line on what it costs that all checks must be met; empty if they need not be."""
+    if done.problem.checks != "required":
+        return ""
+    other, chosen = done.unchecked, done.chosen.evaluation
+    if other is None:
+        return "checks are required, which costs nothing: no better layout was found without them"
+    free = other.evaluation
+    failed = failed_checks(done.other_checks[other.name])
+    faults = [f"fails its checks ({failed_words(failed)})"] if failed else []
+    if RANK[free.targets] > RANK[chosen.targets]:
+        faults.append(f"has targets that are {free.targets}")
+    built = " and ".join(f"{b.label} at x = {b.x:.1f} m" for b in free.layout) or "no barrier"
+    but = f", which {' and '.join(faults)}" if faults else ""
+    more = f"{euros(chosen.objective - free.objective)} EUR per metre and year"
+    cost = f"it is not shown that meeting the checks costs anything ({more})"
+    if (apart := done.compliance) is not None:
+        known = f"{euros(apart.value)} ({span(apart.ci)}) EUR per metre and year"
+        cost = f"it is not shown that meeting the checks costs anything ({known})"
+        if apart.ci[0] > 0.0:
+            cost = f"meeting the checks costs {known}"
+    return (
+        f"without required checks, the search finds {built}{but}: {cost}, as Z is "
+        f"{euros(chosen.objective)} ({span(chosen.ci)}) instead of {euros(free.objective)} "
+        f"({span(free.ci)})"
+    )
+
+
+def for_comparison(done: DesignStudy) -> list[str]:
+    """Return a line on the layouts for comparison that may not be proposed."""
+    kept = {case.name for case in (*done.comparable, *filter(None, [done.unchecked]))}
+    names = [repr(case.name) for case in done.cases if case.name not in kept]
+    if not names:
+        return []
+    fail = "fails a required check and is" if len(names) == 1 else "fail required checks and are"
+    return [f"{' and '.join(names)} {fail} shown for comparison only"]
+
+
+def failed_checks(checks: LayoutChecks) -> list[FailedCheck]:
+    """Return the checks of a layout that are not met, for a headline."""
+    return [
+        FailedCheck(f"{c.barrier}, at {c.x:.1f} m", c.check, c.use / c.limit) for c in checks.failed
+    ]
+
+
+def reaching(evaluation: Evaluation, site: Site) -> tuple[str, float]:
+    """Return the design event that most often reaches the road, and the share of its releases.
+
+    Without design events, the name is empty and the share 0.
+    """
+    shares = {name: evaluation.reach[name].probability for name in design_events(site)}
+    most = max(shares, key=lambda name: shares[name], default="")
+    return most, shares.get(most, 0.0)
+
+
+def answer(done: DesignStudy) -> DesignAnswer:
+    """Return what the first line of a design needs."""
+    site, chosen, nothing = done.problem.site, done.chosen.evaluation, done.nothing.evaluation
+    return DesignAnswer(
+        layout="; ".join(order(barrier, site) for barrier in chosen.layout),
+        bare=before(site),
+        z=(chosen.objective, *chosen.ci),
+        nothing=(nothing.objective, *nothing.ci),
+        targets=chosen.targets,
+        asked=asked_words(done.problem.targets),
+        required=done.problem.checks == "required",
+        failed=failed_checks(done.checks),
+        reaching=reaching(chosen, site),
+    )
+
+
+def asked_words(targets: Targets) -> str:
+    """Return targets in words; empty without any."""
+    parts = []
+    if targets.reach is not None:
+        chance = percentage(targets.reach)
+        parts.append(
+            f"a block of a design event reaches the road with a probability of at most {chance}"
+        )
+    if targets.failure is not None:
+        chance = percentage(targets.failure)
+        parts.append(f"a barrier fails in a design event with a probability of at most {chance}")
+    if targets.individual is not None:
+        chance = f"{targets.individual:.2g}"
+        parts.append(f"a commuter is killed within a year with a probability of at most {chance}")
+    return " and that ".join(parts)
+
+
+def left_over(evaluation: Evaluation) -> str:
+    """Return a text on the remaining risk and the event that causes most of it."""
+    left, most = evaluation.by_event, worst(evaluation)
+    if most is None:
+        return "no harm or repair remains in these releases"
+    total = sum(left.values())
+    words = f"the remaining harm and repair are {euros(total)} EUR per metre and year"
+    if len(left) == 1:
+        return words
+    if left[most] < PART * total:
+        return f"{words}; no event contributes more than {at_most(left[most] / total)}"
+    return f"{words}; {euros(left[most])} of this is from the event {most!r}"
+
+
+def failing(site: Site, evaluation: Evaluation) -> list[str]:
+    """Return lines on the failure of barriers in design events, if it may be above 5 %."""
+    lines = []
+    for event in design_events(site) if site.standing(evaluation.layout) else ():
+        chance = evaluation.failure[event]
+        if chance.releases and chance.bound > SURE:
+            lines.append(
+                f"a barrier fails in {percent(chance.probability)} of the releases of the design "
+                f"event {event!r} (95 % upper bound {at_most(chance.bound)})"
+            )
+    return lines
+
+
+def undecided(problem: DesignProblem, evaluation: Evaluation) -> str:
+    """Return a text that says whether the targets are met; it is empty without targets."""
+    asked = problem.targets
+    if evaluation.targets is None:
+        return ""
+    pairs = (("reach", asked.reach), ("failure", asked.failure))
+    words = " and ".join(f"P({name}) <= {percentage(p)}" for name, p in pairs if p is not None)
+    parts = [f"{words} in every design event"] if words else []
+    if asked.individual is not None:
+        parts.append(f"individual risk <= {asked.individual:.6g} a year")
+    more = "; a larger --verify would decide it" if evaluation.targets == "undecided" else ""
+    return f"target {' and '.join(parts)}: {evaluation.targets}{more}"

@@ -1,0 +1,400 @@
+"""Sections of a report: what each says besides the exhibits of the results folders."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import rigdda
+from rigdda import BadInput, Site
+from rigdda.agents.run_record import RunRecord
+from rigdda.app.reports import assumptions, findings
+from rigdda.app.reports.exhibits import EXHIBITS, RAW, Exhibit
+from rigdda.app.reports.headline import DesignAnswer, FailedCheck, headline
+from rigdda.app.reports.html_blocks import (
+    Block,
+    Figures,
+    Heading,
+    Items,
+    Listing,
+    Paragraph,
+    Row,
+    listed,
+    picture,
+    plain,
+    table,
+)
+from rigdda.app.reports.results_folder import FIELD, ResultsFolder
+from rigdda.app.reports.stations import RATE
+from rigdda.app.reports.tables import RISKS
+from rigdda.app.reports.wording import (
+    at_most,
+    before,
+    euros,
+    figure,
+    order,
+    percent,
+    small,
+    span,
+)
+from rigdda.envs.problem import Targets
+
+Folders = Sequence[ResultsFolder]
+
+
+@dataclass(frozen=True, slots=True)
+class ReportSection:
+    """A section: its name in `EXHIBITS`, its title, and what it says besides the exhibits."""
+
+    name: str
+    title: str
+    opening: Callable[[Folders], Iterable[Block]] = lambda folders: ()
+
+
+LIMITS = (
+    "The section is two-dimensional. Blocks do not leave its plane, and channels or ridges that "
+    "gather or spread rock along the road are not seen.",
+    "A block is as long along the road as the root of its cross-section. Volumes, masses and "
+    "energies of whole blocks rest on this.",
+    "Blocks are rigid and do not break. A block that shatters loses energy, and its fragments may "
+    "fly farther.",
+    "Trees, snow and water are neglected.",
+    "The loss of energy at the ground is the least certain input. Where it was not fitted to "
+    "observed run-outs, deposits or impacts, results may change by more than their intervals.",
+    "Intervals describe the random variation of the releases only. They do not cover errors of the "
+    "profile, the ground, the rates of events, the sizes of blocks or the prices.",
+    "Rates of events are inputs. Costs and rates of passage are proportional to them.",
+    "Barriers are idealised: a fence yields until its elongation is used up, a wall slides or "
+    "overturns as a rigid body, a ditch fills up. Foundations, anchors and the stability of the "
+    "slope itself are not designed.",
+    "The program supports a decision. The engineer who signs it is responsible for it.",
+)
+"""Limits of the method."""
+
+
+def _titled(blocks: list[Block], title: str, many: bool) -> list[Block]:
+    """Return blocks below a heading if there are several folders, and any blocks at all."""
+    return [Heading(title), *blocks] if many and blocks else blocks
+
+
+def exhibits(section: str, folders: Folders) -> list[Block]:
+    """Return the tables and pictures of all folders that a section shows."""
+    many, found = len(folders) > 1, list[Block]()
+    for k, folder in enumerate(folders):
+        own = [e for e in EXHIBITS if e.section == section]
+        blocks = [
+            block for i, e in enumerate(own) for block in _show(e, folder, f"{section}{k}{i}")
+        ]
+        found += _titled(blocks, f"Results in {folder.label}", many)
+    return found
+
+
+def _show(exhibit: Exhibit, folder: ResultsFolder, mark: str) -> Iterator[Block]:
+    """Yield an exhibit for each file of a folder that matches it."""
+    before, _, after = exhibit.files.partition("*")
+    for i, name in enumerate(folder.files(exhibit.files, exhibit.command)):
+        title = exhibit.title.format(part=name.removeprefix(before).removesuffix(after))
+        if name.endswith(".csv"):
+            yield table(folder, name, title, exhibit.words, exhibit.columns, exhibit.shown)
+        else:
+            yield picture(folder.picture(name), title, exhibit.words, f"{mark}{i}")
+
+
+def summary(folders: Folders) -> Iterator[Block]:
+    """Yield the answer first: what to build and what it is worth, or what comes down."""
+    designs = [folder for folder in folders if folder.files("layouts.csv", "design")]
+    for folder in designs:
+        yield from _titled([*_design(folder)], f"Design in {folder.label}", len(designs) > 1)
+    passing = [block for f in folders if f.files("stations.csv") for block in _passing(f)]
+    yield from _titled(passing, "What comes down", bool(designs))
+    site = _site(folders)
+    lines = [f"{line}" for folder in folders for line in _findings(folder, len(folders) > 1)]
+    if site is not None and designs:
+        lines += assumptions.defaults(site)
+    if lines:
+        yield Heading("What limits this answer")
+        yield Items(lines)
+
+
+def _findings(folder: ResultsFolder, many: bool) -> Iterator[str]:
+    """Yield the findings of the commands in a folder, which they printed."""
+    for record in folder.records.values():
+        for line in record.findings:
+            text = line[0].upper() + line[1:] + ("" if line.endswith((".", "?", "!")) else ".")
+            yield f"{folder.label}: {text}" if many else text
+
+
+def _design(folder: ResultsFolder) -> Iterator[Block]:
+    """Yield what to build, where, and what it costs and is worth."""
+    _, rows = folder.table("layouts.csv", ("chosen", "objective_low", "objective_high"))
+    chosen = next((row for row in rows if row["chosen"] == "True"), None)
+    if chosen is None:
+        mend = "no row is the chosen one: run the command that made it again"
+        raise BadInput(FIELD, str(folder.path / "layouts.csv"), mend)
+    site, targets = folder.site, chosen["targets"]
+    layout = rigdda.load_layout(folder.path / "layout.toml")
+    line = headline(_answer(folder, chosen, rows[0]))
+    yield Paragraph(line, "answer" if line.startswith("Build") else "warning")
+    if site is not None and site.existing:
+        yield Items(findings.existing_barriers(site, layout))
+    if targets == "met":
+        yield Paragraph(f"This layout meets the target that {_asked(folder)}.", "good")
+    z, nothing = _money_of(chosen), _money_of(rows[0])
+    bare = before(site) if site is not None else "without barriers"
+    yield Figures([
+        ("To build", f"{euros(float(chosen['cost']))} EUR", "per metre of road"),
+        ("Annual cost Z", f"{z} EUR", f"per metre and year with it ({_ends_of(chosen)})"),
+        (bare.capitalize(), f"{nothing} EUR", f"per metre and year ({_ends_of(rows[0])})"),
+        *_chances(folder, chosen["layout"], rows[0]["layout"], bare),
+        *_individual(folder, chosen["layout"], rows[0]["layout"], bare),
+    ])  # fmt: skip
+
+
+def _answer(folder: ResultsFolder, chosen: Row, nothing: Row) -> DesignAnswer:
+    """Return what the first line of a design needs, from its files."""
+    site, options = folder.site, folder.records["design"].options
+    layout = rigdda.load_layout(folder.path / "layout.toml")
+    words = [order(barrier, site) if site is not None else barrier.label for barrier in layout]
+    _, rows = folder.table("checks.csv") if folder.files("checks.csv") else ([], [])
+    failed = [
+        FailedCheck(
+            f"{row['barrier']}, at {float(row['x_m']):.1f} m",
+            row["check"],
+            float(row["use"]) / float(row["limit"]),
+        )
+        for row in rows
+        if row["satisfied"] == "False"
+    ]
+    names = ("objective", "objective_low", "objective_high")
+    return DesignAnswer(
+        layout="; ".join(words),
+        bare=before(site) if site is not None else "without barriers",
+        z=(float(chosen[names[0]]), float(chosen[names[1]]), float(chosen[names[2]])),
+        nothing=(float(nothing[names[0]]), float(nothing[names[1]]), float(nothing[names[2]])),
+        targets=chosen["targets"] or None,
+        asked=_asked(folder),
+        required=options.get("checks") == "required",
+        failed=failed,
+        reaching=_reaching(folder, chosen["layout"]),
+    )
+
+
+def _asked(folder: ResultsFolder) -> str:
+    """Return the targets of a design in words."""
+    options = folder.records["design"].options
+    return findings.asked_words(
+        Targets(options.get("target"), options.get("failure"), options.get("target_risk"))
+    )
+
+
+def _reaching(folder: ResultsFolder, layout: str) -> tuple[str, float]:
+    """Return the design event that most often reaches the road with a layout, and how often [-]."""
+    _, rows = folder.table("chances.csv") if folder.files("chances.csv") else ([], [])
+    own = {
+        row["event"]: float(row["reach"])
+        for row in rows
+        if row["layout"] == layout and row["design"] == "True"
+    }
+    most = max(own, key=lambda name: own[name], default="")
+    return most, own.get(most, 0.0)
+
+
+def _money_of(row: Row) -> str:
+    return euros(float(row["objective"]))
+
+
+def _ends_of(row: Row) -> str:
+    return span((float(row["objective_low"]), float(row["objective_high"])))
+
+
+def _individual(
+    folder: ResultsFolder, name: str, without: str, bare: str
+) -> Iterator[tuple[str, str, str]]:
+    """Yield the individual risk with a layout and without it, if the site gives traffic."""
+    _, rows = folder.table(RISKS) if folder.files(RISKS) else ([], [])
+    own = {row["layout"]: row for row in rows}
+    if name in own and without in own:
+        now, then = (float(own[layout]["individual"]) for layout in (name, without))
+        high = float(own[name]["individual_high"])
+        rest = f"a year, at most {small(high, 'up')}; {bare} {then:.2g}"
+        yield "A commuter is killed", f"{now:.2g}", rest
+
+
+def _chances(
+    folder: ResultsFolder, name: str, without: str, bare: str
+) -> Iterator[tuple[str, str, str]]:
+    """Yield the probabilities of the design events with a layout, and without it."""
+    _, rows = folder.table("chances.csv") if folder.files("chances.csv") else ([], [])
+    for row in rows:
+        if row["design"] == "True" and row["layout"] == name:
+            earlier = next(r for r in rows if r["event"] == row["event"] and r["layout"] == without)
+            reach, bound = float(row["reach"]), float(row["reach_bound"])
+            rest = f"at most {at_most(bound)}; {bare} {percent(float(earlier['reach']))}"
+            yield f"“{row['event']}” reaches the road", percent(reach), rest
+            fails, bound = float(row["failure"]), float(row["failure_bound"])
+            if name != without:
+                yield f"A barrier fails in “{row['event']}”", percent(fails), (
+                    f"at most {at_most(bound)}"
+                )  # fmt: skip
+
+
+def _passing(folder: ResultsFolder) -> Iterator[Block]:
+    """Yield what passes the stations of a simulation, in sentences."""
+    _, rows = folder.table("stations.csv")
+    last = rows[-1]["event"] if rows else ""
+    record = folder.records.get("simulate")
+    layout = record.options.get("layout") if record else None
+    bare = before(folder.site) if folder.site is not None else "without barriers"
+    what = f"with the layout of {layout}" if layout else bare
+    lines = []
+    for row in rows:
+        if row["event"] == last and row["quantity"] == RATE:
+            own = {r["quantity"]: r for r in rows if r["x_m"] == row["x_m"] and r["event"] == last}
+            lines.append(_station(row, own, what))
+    if lines:
+        yield Items(lines)
+
+
+def _station(rate: Row, own: dict[str, Row], what: str) -> str:
+    """Return a sentence on what passes a station."""
+    where = f"At x = {plain(float(rate['x_m']))} m, {what}, "
+    if int(rate["n"]) == 0:
+        return f"{where}no block passes in {int(rate['releases']):,} releases."
+    energy, height, normal = own["energy"], own["height"], own.get("height_normal")
+    level = "" if normal is None else f", {figure(float(normal['q95']))} m normal to the slope"
+    return (
+        f"{where}{figure(float(rate['mean']))} releases a year pass on 100 m of road; 95 % of the "
+        f"{int(rate['n']):,} passing blocks have less than {figure(float(energy['q95']))} kJ, and "
+        f"the centres of 95 % are lower than {figure(float(height['q95']))} m above the ground"
+        f"{level}."
+    )
+
+
+def _site(folders: Folders) -> Site | None:
+    return next((folder.site for folder in folders if folder.site is not None), None)
+
+
+def site(folders: Folders) -> Iterator[Block]:
+    """Yield the site, and how the sites of other folders differ from it."""
+    first = _site(folders)
+    if first is None:
+        return
+    yield from assumptions.the_site(first)
+    for folder in folders:
+        if folder.site is not None and folder.site != first:
+            yield Paragraph(f"The site of {folder.label} differs from this one:")
+            yield Items(assumptions.differences(first, folder.site))
+
+
+def assumed(folders: Folders) -> Iterator[Block]:
+    """Yield the assumptions of the site."""
+    first = _site(folders)
+    if first is not None:
+        yield from assumptions.assumptions(first)
+
+
+def limits(_: Folders) -> Iterator[Block]:
+    """Yield the limits of the method."""
+    yield Items(LIMITS)
+
+
+def repeat(folders: Folders) -> Iterator[Block]:
+    """Yield commands, seeds and versions, with which the results can be repeated."""
+    yield Paragraph(
+        "On one machine, the same version gives the same numbers bit for bit. The results folders "
+        "hold the site as it was used and all options in run.json."
+    )
+    records = [(folder, record) for folder in folders for record in folder.records.values()]
+    commands = [shlex.join(["rigdda", *record.arguments]) for _, record in records]
+    yield Listing("\n".join(commands))
+    head = ("results", "command", "began (UTC)", "ended (UTC)", "seed", "rigdda")
+    rows = [_run(folder, record) for folder, record in records]
+    yield listed("Runs", "", head, rows)
+    versions = dict.fromkeys(record.versions for _, record in records)
+    names = ("rigdda", "mechanics", "numba", "numpy", "python", "machine")
+    rows = [[getattr(v, name) for name in names] for v in versions]
+    yield listed("Versions", "mechanics: version of everything that affects a result.", names, rows)
+    rest = [_options(record) for _, record in records]
+    yield listed("Options", "All options, also those that were not typed.", ("command", "options"),
+                 rest)  # fmt: skip
+
+
+def _run(folder: ResultsFolder, record: RunRecord) -> list[str]:
+    seed = record.options.get("seed")
+    began, ended = (time[:19].replace("T", " ") for time in (record.started, record.ended))
+    return [folder.label, record.command, began, ended, "-" if seed is None else str(seed),
+            record.versions.rigdda]  # fmt: skip
+
+
+def _options(record: RunRecord) -> list[str]:
+    said = [f"{name} = {'-' if v is None else v}" for name, v in record.options.items()]
+    return [record.command, ", ".join(said)]
+
+
+SMALL = 40
+"""Rows up to which a table without an exhibit is shown as a whole."""
+
+WIDE = 12
+"""Columns up to which a table without an exhibit is shown as a whole."""
+
+
+def appendix(folders: Folders) -> Iterator[Block]:
+    """Yield the tables that are in no section: small ones as a whole, others by name."""
+    rows = []
+    for folder in folders:
+        shown = {name for e in EXHIBITS for name in folder.files(e.files, e.command)}
+        for name in (name for name in folder.others() if name not in shown):
+            head, found = folder.table(name)
+            if name not in RAW and len(found) <= SMALL and len(head) <= WIDE:
+                yield table(folder, name, f"{folder.label}/{name}", "All rows of the file.")
+            else:
+                what = RAW.get(name, f"columns: {', '.join(head)}")
+                rows.append((f"{folder.label}/{name}", what, f"{len(found):,}"))
+    if rows:
+        names = ("file", "what it holds", "rows")
+        yield listed("Tables that are too long to show", "", names, rows, ("rows",))
+    sites: dict[str, list[str]] = {}
+    for folder in folders:
+        for text in dict.fromkeys(record.site for record in folder.records.values()):
+            sites.setdefault(text, []).append(folder.label)
+    for text, labels in sites.items():
+        if text:
+            yield Listing(compact(text), f"Site file of {', '.join(labels)}, with all defaults")
+
+
+NUMBERS = re.compile(r"\[\s+((?:[-+.\de]+,\s+)+)\]")
+"""A list of numbers in TOML, one on each line."""
+
+
+def compact(text: str) -> str:
+    """Return a TOML text with each list of numbers on one line."""
+    short = NUMBERS.sub(lambda found: f"[{', '.join(found[1].replace(',', ' ').split())}]", text)
+    return short if tomllib.loads(short) == tomllib.loads(text) else text
+
+
+SECTIONS = (
+    ReportSection("summary", "Summary", summary),
+    ReportSection("site", "Site", site),
+    ReportSection("assumptions", "Assumptions and their sources", assumed),
+    ReportSection("passing", "What comes down"),
+    ReportSection("layouts", "Layouts compared"),
+    ReportSection("corridor", "Corridor"),
+    ReportSection("checks", "Checks"),
+    ReportSection("risk", "Risk to life and traffic"),
+    ReportSection("sureness", "How sure the answer is"),
+    ReportSection("frontier", "What other targets cost"),
+    ReportSection("limits", "Limits of the method", limits),
+    ReportSection("repeat", "How to repeat the results", repeat),
+    ReportSection("appendix", "Appendix", appendix),
+)
+"""Sections of a report in their order. One without content is left out."""
+
+
+def filled(folders: Folders) -> list[tuple[ReportSection, list[Block]]]:
+    """Return the sections that have content, with their blocks."""
+    shown = {s.name: exhibits(s.name, folders) for s in SECTIONS}  # first, as they check the files
+    found = [(s, [*s.opening(folders), *shown[s.name]]) for s in SECTIONS]
+    return [(section, blocks) for section, blocks in found if blocks]

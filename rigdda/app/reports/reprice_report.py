@@ -1,0 +1,92 @@
+"""Files and texts of `rigdda reprice`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import rigdda
+from rigdda.agents.designers.frontier import TriedLayout
+from rigdda.app.design_study import SHED
+from rigdda.app.reports import findings, frontier_report, pictures
+from rigdda.app.reports.tables import known_risks, write_risks, write_rows
+from rigdda.app.reports.wording import number
+from rigdda.app.reprice import BEST, Change, Repriced
+from rigdda.envs import Evaluation
+
+FILES = ("costs.csv", "site.toml", "layout.toml", "cost.png")
+
+
+def write(done: Repriced, folder: Path) -> None:
+    """Write the table, the site with its new values, the best layout and the pictures."""
+    write_rows(folder / "costs.csv", rows(done))
+    write_risks(folder, known_risks(done))
+    done.problem.site.save(folder / "site.toml")
+    rigdda.save_layout(done.chosen.evaluation.layout, folder / "layout.toml")
+    points = [pictures.Point.of(case.name, case.evaluation) for case in done.cases]
+    shed = pictures.Point(SHED, done.problem.site.shed(), 0.0, (0.0, 0.0))
+    pictures.cost(folder / "cost.png", [], [*points, shed])
+    frontier_report.write(folder, done.problem, done.frontier)
+
+
+def rows(done: Repriced) -> list[dict[str, Any]]:
+    """Return one row for each layout; Z and its parts in EUR per metre of road and year.
+
+    Probabilities are those of the design event with the largest upper bound.
+    """
+    return [_row(done, case.name, case.evaluation) for case in done.cases]
+
+
+def _row(done: Repriced, name: str, e: Evaluation) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "layout": name,
+        "objective": e.objective,
+        "objective_low": e.ci[0],
+        "objective_high": e.ci[1],
+        "capital": e.capital,
+        "harm": e.harm,
+        "repair": e.repair,
+        "cost": e.cost,
+        "debris_share": e.debris_share,
+        "targets": e.targets or "",
+        "releases": e.releases,
+        "verified": name != BEST or done.verified,
+    }
+    site = done.problem.site
+    if any(event.design for event in site.events):
+        one = TriedLayout.of(site, e)
+        row |= {
+            "reach": one.reach.probability,
+            "reach_bound": one.level,
+            "failure": one.failure.probability,
+            "failure_bound": one.failure.bound,
+        }
+    return row
+
+
+def changed(change: Change) -> str:
+    """Return a change in words."""
+    before = "default" if change.before is None else number(change.before)
+    return f"{change.path} = {number(change.after)} (was {before})"
+
+
+def sentences(done: Repriced) -> list[str]:
+    """Return what the answer says beyond its numbers."""
+    cases = [(case.name, case.evaluation) for case in done.cases]
+    found, chosen = done.cases[-2].evaluation, done.chosen.evaluation
+    among = f"the choice among {done.tried:,} layouts that were evaluated"
+    if chosen.layout == found.layout:
+        line = f"the layout of the design, {done.cases[-2].name!r}, remains {among}"
+    elif done.verified:
+        line = f"{BEST!r} is {among}; the design verified it"
+    else:
+        line = f"{BEST!r} is {among}, but was not verified: Z is the mean of the "
+        line += f"{chosen.releases:,} releases of the search by which it was chosen, and probably "
+        line += "too low; `rigdda design` with site.toml searches and verifies again"
+    lines = [line]
+    lines += findings.over_the_cap(done.problem, cases)
+    lines.append(findings.no_layout_pays(done.problem.site, cases))
+    lines += [*findings.failing(done.problem.site, chosen)]
+    lines.append(findings.undecided(done.problem, chosen))
+    lines.append(findings.left_over(chosen))
+    return [line for line in lines if line]

@@ -1,0 +1,518 @@
+"""Answers for other prices, consequences, rates, caps and targets from the outcomes of a design.
+
+Nothing is simulated. Costs and probabilities are computed from the stored outcomes as a design
+computes them. Z is the sum of the means of the events, each times the rate of the event. Another
+rate therefore only changes the weight of a mean; the releases need no weights of their own. Only if
+a layout has fewer than two releases per event on average, each release is weighted by the new rate
+divided by the probability with which its event was drawn (importance sampling).
+
+With the same releases, the results equal those of a new design to the last digit.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from rigdda import BadInput, Layout, Outcome, Site, fields
+from rigdda.agents.designers.frontier import TriedLayout, frontier, worst
+from rigdda.agents.designers.protocol import CHOICE, STREAMS, End, of_chance, of_mean
+from rigdda.app import archive
+from rigdda.app.archive import Archive
+from rigdda.app.design_study import ComparedLayouts, VerifiedLayout
+from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.cost import account, judge
+from rigdda.envs.ensemble import Ensemble, statistics
+from rigdda.envs.intervals import Estimate, Mean, estimate
+from rigdda.envs.outcome_cache import NO_EVENT_MOTION, NO_MOTION
+from rigdda.envs.problem import MISSED, Targets, excess, read_targets
+
+BEST = "best of search"
+"""Name of the layout that is best for the new values."""
+
+Value = bool | int | float | str | Mapping[str, Any]
+
+EVENT_KEYS = (*NO_EVENT_MOTION, "return_period", "section_length")
+"""Keys of an event that do not affect its releases."""
+
+MOTION = (
+    "existing",
+    *(name for name in Site.__struct_fields__ if name not in (*NO_MOTION, "events")),
+)
+"""Tables of a site file on which the motion of rock depends."""
+
+LABELS = ("name", "description", "family", "origin", "lumped")
+"""Keys of a site file that affect no result of a design."""
+
+
+class Change(NamedTuple):
+    """A value of a site file that was changed."""
+
+    path: str
+    before: Any
+    after: Any
+
+
+def parse(text: str) -> tuple[str, Value]:
+    """Return path and value of a setting written as PATH=VALUE, with the value as in TOML.
+
+    Raises
+    ------
+    BadInput
+        If it has another form.
+    """
+    path, given, value = text.partition("=")
+    path = path.strip()
+    if not given or not path:
+        raise BadInput("--set", text, "write PATH=VALUE, such as consequences.closure=20000")
+    try:
+        found = msgspec.toml.decode(f"value = {value.strip()}")
+    except msgspec.DecodeError:
+        mend = "write a number, true, false or a text in quotation marks after the ="
+        raise BadInput("--set", text, mend) from None
+    return path, found["value"]
+
+
+def parse_all(texts: Sequence[str]) -> dict[str, Value]:
+    """Return settings by path; see `parse`.
+
+    Raises
+    ------
+    BadInput
+        If one has another form, or two have the same path.
+    """
+    found: dict[str, Value] = {}
+    for text in texts:
+        path, value = parse(text)
+        if path in found:
+            raise BadInput("--set", text, "set each key once")
+        found[path] = value
+    return found
+
+
+def other_targets(
+    reach: float | None, failure: float | None, individual: float | None
+) -> dict[str, float] | None:
+    """Return the targets that replace those of the design; None if all are None."""
+    given = {"reach": reach, "failure": failure, "individual": individual}
+    return {name: value for name, value in given.items() if value is not None} or None
+
+
+def with_settings(site: Site, settings: Mapping[str, Value]) -> tuple[Site, tuple[Change, ...]]:
+    """Return a site with other values and the changes.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    settings : mapping of str to value
+        New values by path in the site file, such as "consequences.closure", "prices.fence.500",
+        "events.block.rate" or "meshes.light.price".
+
+    Raises
+    ------
+    BadInput
+        If there is no such key, a value is invalid, or the motion of rock depends on it.
+    """
+    changes = []
+    for path, value in settings.items():
+        changes.append(Change(path, _present(site, path, value), value))
+        site = _with(site, path, value)
+    return site, tuple(changes)
+
+
+def _table_of(site: Site, path: str, value: Value) -> tuple[str, list[str]]:
+    """Return the table of a path that may be changed, and the keys within it."""
+    top, *keys = path.split(".")
+    names = type(site).__struct_fields__
+    if top not in names:
+        near = difflib.get_close_matches(top, names, 1)
+        mend = f"did you mean {near[0]}?" if near else "give a key such as consequences.closure"
+        raise BadInput(path, value, f"there is no such key: {mend}")
+    if top == "barrier_zone":
+        mend = "a search in another zone tries other layouts: run `rigdda design` for this"
+        raise BadInput(path, value, mend)
+    if top in MOTION:
+        raise _needs_simulation(path, value)
+    if top in LABELS:
+        raise BadInput(path, value, "leave it out: no result depends on it")
+    if not keys:
+        raise BadInput(path, value, f"add a key of the table, such as {top}.KEY=VALUE")
+    if getattr(site, top) is None:
+        mend = f"add the table [{top}] to the site file and run `rigdda design`"
+        raise BadInput(path, value, mend)
+    return top, keys
+
+
+def _needs_simulation(path: str, value: Value) -> BadInput:
+    mend = "releases depend on it: change it in the site file and run `rigdda design`"
+    return BadInput(path, value, mend)
+
+
+def _named(site: Site, path: str, value: Value, top: str) -> tuple[int, list[str]]:
+    """Return the index of a named table in a list, and the keys within it.
+
+    Names may contain dots. The longest name with which the path begins is meant.
+    """
+    rest = path.removeprefix(f"{top}.")
+    names = [table.name for table in getattr(site, top)]
+    found = [name for name in names if rest == name or rest.startswith(f"{name}.")]
+    if not found:
+        known = ", ".join(names) or f"none: the site has no {top}"
+        raise BadInput(path, value, f"give the name of one of the {top}: {known}")
+    name = max(found, key=len)
+    keys = rest[len(name) + 1 :].split(".") if rest != name else []
+    if not keys:
+        raise BadInput(path, value, f"add a key, such as {top}.{name}.KEY=VALUE")
+    if top == "events":
+        known_keys = type(site.events[0]).__struct_fields__
+        if keys[0] in known_keys and keys[0] not in EVENT_KEYS:
+            raise _needs_simulation(path, value)
+    return names.index(name), keys
+
+
+def _present(site: Site, path: str, value: Value) -> Any:
+    """Return the present value of a path, or None if it has none; `value` is the new one."""
+    top, keys = _table_of(site, path, value)
+    table: Any = getattr(site, top)
+    if isinstance(table, tuple):
+        index, keys = _named(site, path, value, top)
+        table = table[index]
+    found = msgspec.to_builtins(table)
+    for key in keys:
+        found = found.get(key) if isinstance(found, dict) else None
+    return found
+
+
+def _with(site: Site, path: str, value: Value) -> Site:
+    """Return a site with one other value."""
+    top, keys = _table_of(site, path, value)
+    table: Any = getattr(site, top)
+    if not isinstance(table, tuple):
+        return msgspec.structs.replace(site, **{top: _changed(table, path, top, keys, value)})
+    index, keys = _named(site, path, value, top)
+    where = f"{top}.{table[index].name}"
+    new = _changed(table[index], path, where, keys, value)
+    return msgspec.structs.replace(site, **{top: (*table[:index], new, *table[index + 1 :])})
+
+
+def _changed(
+    table: msgspec.Struct, path: str, where: str, keys: Sequence[str], value: Value
+) -> msgspec.Struct:
+    """Return a table of a site with one other value."""
+    found = {k: v for k, v in msgspec.to_builtins(table).items() if v is not None}
+    if keys[0] in ("return_period", "section_length"):
+        found.pop("rate")
+    inner = found
+    for key in keys[:-1]:
+        inner = inner.setdefault(key, {})
+        if not isinstance(inner, dict):
+            raise BadInput(path, value, f"shorten it: {key} has no further keys")
+    inner[keys[-1]] = value
+    return fields.read(type(table), found, where)
+
+
+class ArchivedProblem(DesignProblem):
+    """A design problem whose statistics follow from archived releases, without simulation.
+
+    Parameters
+    ----------
+    kept : Archive
+        The archive.
+    site : Site
+        The site with the new values.
+    targets : Targets
+        The targets.
+    max_cost : float, optional
+        Largest capital cost of a layout [EUR per metre of road].
+
+    Raises
+    ------
+    BadInput
+        As `DesignProblem` does.
+    """
+
+    def __init__(self, kept: Archive, site: Site, targets: Targets, max_cost: float | None):
+        super().__init__(
+            site, kept.max_barriers, kept.kinds, targets, zone=kept.zone, max_cost=max_cost
+        )
+        facts = statistics(site, kept.bare, kept.blocks)
+        nothing = replace(judge(site, (), kept.bare, {}, {}), outcomes=())
+        object.__setattr__(self, "_ensemble", Ensemble(nothing, facts, kept.shares))
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Share of the releases for each event in the design."""
+        return self._known.shares
+
+    @property
+    def _known(self) -> Ensemble:
+        found: Ensemble = self._ensemble  # type: ignore[attr-defined]
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class ScoredLayout:
+    """A layout of the search and what its releases say at the new values.
+
+    Parameters
+    ----------
+    layout : tuple of Barrier
+        The layout.
+    outcomes : tuple of Outcome
+        Outcomes of its releases: those of the verification, or else of the search.
+    verified : bool
+        Whether it was verified.
+    upper : float
+        Estimate of Z plus two standard errors [EUR per metre of road and year].
+    tried : TriedLayout or None
+        Its cost and probabilities; None if the site has no design events.
+    over, share, least : float
+        Largest excess over a target, of upper bounds, of probabilities and of lower bounds [-].
+    """
+
+    layout: Layout
+    outcomes: tuple[Outcome, ...]
+    verified: bool
+    upper: float
+    tried: TriedLayout | None
+    over: float
+    share: float
+    least: float
+
+
+@dataclass(frozen=True, slots=True)
+class Repriced(ComparedLayouts):
+    """Results for other values.
+
+    Parameters
+    ----------
+    changes : tuple of Change
+        What was changed in the site file.
+    cases : tuple of VerifiedLayout
+        The verified layouts of the design and, as the last one, the best layout of the search.
+    verified : bool
+        Whether the best layout was verified by the design. If not, its evaluation is on the
+        releases of the search, and Z is probably too low, because it was chosen among many.
+    tried : int
+        Number of layouts among which it was chosen.
+    frontier : tuple of TriedLayout
+        The cheapest layout for each level of P(reach), if the best layout misses a target.
+    """
+
+    changes: tuple[Change, ...]
+    verified: bool
+    tried: int
+    frontier: tuple[TriedLayout, ...]
+
+
+def reprice(
+    results: str | os.PathLike[str],
+    settings: Mapping[str, Value] | None = None,
+    targets: Targets | Mapping[str, float | None] | None = None,
+    max_cost: float | None = None,
+) -> Repriced:
+    """Return the results of a design for other values, without simulation.
+
+    Parameters
+    ----------
+    results : path
+        Folder of a completed `rigdda design`.
+    settings : mapping, optional
+        New values by path in the site file, see `with_settings`.
+    targets : Targets or mapping, optional
+        Other targets; those that are not given are as in the design.
+    max_cost : float, optional
+        Another largest capital cost [EUR per metre of road]; by default that of the design.
+
+    Raises
+    ------
+    BadInput
+        If the folder contains no completed design, or a setting is invalid.
+    """
+    kept = archive.read(Path(results))
+    site, changes = with_settings(kept.site, settings or {})
+    asked = targets if isinstance(targets, Targets) else _merged(kept.targets, targets or {})
+    most = kept.max_cost if max_cost is None else max_cost
+    problem = ArchivedProblem(kept, site, asked, most)
+    found = _candidates(problem, kept)
+    best, evaluation = choose(problem, list(found.values()), kept)
+    cases = []
+    for name, tables in zip(kept.names, kept.layouts, strict=True):
+        layout = archive.layout_of(tables)
+        cases.append(VerifiedLayout(name, judged(problem, found[layout], kept)))
+    cases.append(VerifiedLayout(BEST, evaluation))
+    tried = [c for c in found.values() if problem.place.too_expensive(c.layout) is None]
+    front: tuple[TriedLayout, ...] = ()
+    if evaluation.targets == MISSED:
+        front = tuple(
+            replace(one, verified=judged(problem, found[one.layout], kept))
+            if found[one.layout].verified
+            else one
+            for one in frontier([c.tried for c in tried if c.tried is not None])
+        )
+    return Repriced(
+        problem=problem,
+        cases=tuple(cases),
+        changes=changes,
+        verified=best.verified,
+        tried=len(tried),
+        frontier=front,
+    )
+
+
+def _merged(before: Targets, given: Mapping[str, float | None]) -> Targets:
+    """Return targets of which some are replaced."""
+    read_targets(given)
+    return replace(before, **given)
+
+
+def judged(problem: DesignProblem, candidate: ScoredLayout, kept: Archive) -> Evaluation:
+    """Return the evaluation of a candidate.
+
+    An event that was not released with the layout costs as much as without barriers.
+    """
+    known = {outcome.event for outcome in candidate.outcomes}
+    missing = [name for name in problem.site.event_names if name not in known]
+    lent = [replace(outcome, barriers=()) for outcome in kept.bare if outcome.event in missing]
+    found = problem.judge(candidate.layout, (*candidate.outcomes, *lent))
+    unknown = dict.fromkeys(missing, estimate(0, 0))
+    found = replace(found, reach=found.reach | unknown, failure=found.failure | unknown)
+    return replace(
+        found,
+        outcomes=(),
+        releases=len(candidate.outcomes),
+        simulated=0,
+        targets=problem.state(found),
+    )
+
+
+VERIFIED = (STREAMS.index("verification"), STREAMS.index(CHOICE))
+"""Streams of releases that no search used, the one of the table of the design first."""
+
+
+def _candidates(problem: ArchivedProblem, kept: Archive) -> dict[Layout, ScoredLayout]:
+    """Return every layout of the archive with what its releases say at the new values."""
+    bare = account(problem.site, (), kept.bare)
+    spent = {
+        name: (bare.harm + bare.repair)[bare.event == name] for name in problem.site.event_names
+    }
+    found = {}
+    for own in kept.releases:
+        layout = archive.layout_of(own.barriers)
+        pairs = list(zip(own.seeds, own.outcomes, strict=True))
+        streams = [[o for seed, o in pairs if seed % len(STREAMS) == k] for k in VERIFIED]
+        checked = next(filter(None, streams), [])
+        outcomes = tuple(checked or own.outcomes)
+        found[layout] = _candidate(problem, layout, outcomes, bool(checked), spent)
+    return found
+
+
+FEW = 8
+"""Number of releases of an event to which the mean without barriers complements fewer releases."""
+
+ERRORS = 2.0
+"""Number of standard errors above an estimate of Z at which layouts are compared first [-]."""
+
+
+def _candidate(
+    problem: DesignProblem,
+    layout: Layout,
+    outcomes: tuple[Outcome, ...],
+    verified: bool,
+    spent: Mapping[str, np.ndarray],
+) -> ScoredLayout:
+    """Return a layout with what its releases say.
+
+    The sample of each event is extended by one release that deviates from the mean by the standard
+    deviation without barriers, because none of n releases does not mean never.
+    """
+    site, own = problem.site, account(problem.site, layout, outcomes)
+    value, variance = site.annual(layout), 0.0
+    chances: dict[str, tuple[Estimate, Estimate]] = {}
+    for event in site.events:
+        which, without = own.event == event.name, spent[event.name]
+        bills, n = (own.harm + own.repair)[which], int(which.sum())
+        rate = site.rate(event.name, layout)
+        more = max(FEW - n, 0)
+        mean = (float(bills.sum()) + more * float(without.mean())) / (n + more)
+        squares = float(np.square(bills - mean).sum()) + (more + 1) * float(without.var())
+        value += rate * mean
+        variance += rate**2 * squares / (n + more) ** 2
+        if event.design:
+            counts = int(own.reached[which].sum()), int(own.failed[which].sum())
+            chances[event.name] = estimate(counts[0], n), estimate(counts[1], n)
+    risk = None
+    if problem.targets.individual is not None and own.toll is not None:
+        killed = {name: own.toll[own.event == name, 2].tolist() for name in site.event_names}
+        risk = problem.individual_risk(layout, killed)
+    ends: tuple[End, ...] = ("upper", "value", "lower")
+    over = [_excess(problem.targets, chances, risk, end) for end in ends]
+    tried = None
+    if chances:
+        reach, failure = (worst(seen) for seen in zip(*chances.values(), strict=True))
+        tried = TriedLayout(layout, site.capital(layout), reach, failure)
+    upper = value + ERRORS * math.sqrt(variance)
+    return ScoredLayout(layout, outcomes, verified, upper, tried, *over)
+
+
+def _excess(
+    targets: Targets,
+    chances: Mapping[str, tuple[Estimate, Estimate]],
+    risk: Mean | None,
+    end: End,
+) -> float:
+    """Return the largest excess over a target [-]; 0 if there is none.
+
+    It is that of upper bounds, estimates or lower bounds of the probabilities and of the individual
+    risk. A probability without releases counts as 1.
+    """
+    over = [0.0]
+    for which, wanted in enumerate((targets.reach, targets.failure)):
+        if wanted is not None:
+            found = [of_chance(pair[which], end) for pair in chances.values()]
+            over += [(1.0 if math.isnan(value) else value) - wanted for value in found]
+    if risk is not None and targets.individual is not None:
+        over.append(excess(of_mean(risk, end), targets.individual))
+    return max(over)
+
+
+SHORTLIST = 40
+"""Number of layouts whose intervals of Z are computed to choose the best."""
+
+
+def choose(
+    problem: DesignProblem, candidates: Sequence[ScoredLayout], kept: Archive
+) -> tuple[ScoredLayout, Evaluation]:
+    """Return the best candidate that may be built, and its evaluation.
+
+    Among those that meet the targets, it is the one with the lowest Z. A layout that was not
+    verified counts with the upper end of the 95 % interval of Z instead, so that none is chosen
+    because it has few releases and was lucky.
+
+    If none meets the targets, the choice is among the verified layouts with barriers, or among all
+    if there are none. It is the one that misses the targets least. If the probabilities of none of
+    them are within the targets, others that are not shown to miss them by more and have at least
+    half as many releases compete with it by Z, see `protocol.best_of_finals`.
+    """
+    may = [c for c in candidates if problem.place.too_expensive(c.layout) is None]
+    field = [c for c in may if c.over <= 0.0]
+    if not field:
+        may = [c for c in may if c.verified and c.layout] or may
+        first = min(may, key=lambda c: (c.over, c.upper))
+        enough = 0.5 * len(first.outcomes)
+        field = [c for c in may if c.least <= first.over and len(c.outcomes) >= enough]
+        if any(c.share <= 0.0 for c in may):
+            field = [first]
+    order = sorted(field, key=lambda c: c.upper)
+    short = [*order[:SHORTLIST], *(c for c in order[SHORTLIST:] if c.verified)]
+    judgements = [(c, judged(problem, c, kept)) for c in short]
+    return min(judgements, key=lambda p: p[1].objective if p[0].verified else p[1].ci[1])

@@ -1,0 +1,1 @@
+"""Uncertain numbers of a site: fits to observations, sensitivity analysis and ground bands."""

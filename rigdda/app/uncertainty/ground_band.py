@@ -1,0 +1,234 @@
+"""Band of a design: costs and risks of its layouts over the plausible range of the ground.
+
+The ground is the least certain input of a design. Layouts that were designed for the values of the
+site are evaluated on sites whose surfaces have other rolling resistance, restitution and friction,
+within the ranges of the library of grounds or from the posterior of a fit. All sites and layouts
+have the same releases.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda import Layout, Site
+from rigdda.agents.designers.protocol import release_seeds
+from rigdda.app.design_study import DesignStudy, design_events
+from rigdda.app.uncertainty.parameters import (
+    Input,
+    Posterior,
+    check_limits,
+    ground,
+    site_at,
+)
+from rigdda.app.uncertainty.varied_sites import PARTS, Priced, SimulatedSite, noise, price, simulate
+from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.cost import judge
+
+Floats = NDArray[np.float64]
+Tick = Callable[[int, str], None]
+
+GROUNDS = 6
+"""Default number of grounds."""
+
+RELEASES = 120
+"""Number of releases of each layout on each ground."""
+
+SURE = 1.96
+"""Standard errors from which two values of Z on the same releases count as different [-]."""
+
+State = Literal["cheapest", "undecided", "dearer"]
+
+
+class BandLayout(NamedTuple):
+    """A layout on one ground.
+
+    Parameters
+    ----------
+    name : str
+        Name of the layout.
+    evaluation : Evaluation
+        Its evaluation on this ground.
+    priced : Priced
+        Its cost in each release.
+    comparable : bool
+        Whether it may be chosen; not if it fails a required check.
+    """
+
+    name: str
+    evaluation: Evaluation
+    priced: Priced
+    comparable: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroundSample:
+    """The layouts of a design on one ground.
+
+    Parameters
+    ----------
+    values : dict of str to float
+        The values that differ from those of the site, by their paths.
+    cases : tuple of BandLayout
+        The layouts; the last one is the chosen layout.
+    strata : (R,) array
+        Event of each release.
+    targets : {"met", "missed", "undecided"} or None
+        Whether the chosen layout meets the targets of the design; None if there are none.
+    """
+
+    values: dict[str, float]
+    cases: tuple[BandLayout, ...]
+    strata: NDArray[np.int64]
+    targets: str | None
+
+    @property
+    def cheapest(self) -> BandLayout:
+        """The layout with the least Z of those that may be chosen."""
+        own = [case for case in self.cases if case.comparable]
+        return min(own, key=lambda case: case.priced.objective)
+
+    @property
+    def state(self) -> State:
+        """Whether the chosen layout is the cheapest, dearer than another one, or undecided.
+
+        It is undecided if another layout is cheaper, but not by more than the noise of the
+        difference on the same releases.
+        """
+        chosen, best = self.cases[-1].priced, self.cheapest.priced
+        if chosen.objective <= best.objective:
+            return "cheapest"
+        error = math.sqrt(float(noise((chosen.terms - best.terms)[None], self.strata)[0]))
+        dearer = chosen.objective - best.objective > SURE * error
+        return "dearer" if dearer else "undecided"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Band:
+    """The layouts of a design on all grounds.
+
+    Parameters
+    ----------
+    samples : tuple of GroundSample
+        The grounds.
+    releases : int
+        Number of releases of each layout on each ground.
+    source : str
+        Where the grounds come from, in words.
+    events : tuple of str
+        The design events.
+    """
+
+    samples: tuple[GroundSample, ...]
+    releases: int
+    source: str
+    events: tuple[str, ...]
+
+    def share(self, state: State) -> float:
+        """Return the share of the grounds on which the chosen layout is in a state [-]."""
+        return sum(sample.state == state for sample in self.samples) / len(self.samples)
+
+
+def inputs(site: Site, posterior: Posterior | None) -> tuple[Input, ...]:
+    """Return the uncertain numbers of the ground; a posterior replaces those that it contains.
+
+    Raises
+    ------
+    BadInput
+        If the site is invalid at a limit.
+    """
+    joint = () if posterior is None else (posterior,)
+    known = {path for one in joint for path in one.paths}
+    others = tuple(one for one in ground(site) if one.path not in known)
+    check_limits(site, others)
+    return (*joint, *others)
+
+
+def assess(
+    done: DesignStudy,
+    grounds: int,
+    posterior: Posterior | None,
+    seed: int,
+    out: Path,
+    tick: Tick,
+) -> Band:
+    """Evaluate the layouts of a design on a Latin hypercube of grounds.
+
+    Parameters
+    ----------
+    done : DesignStudy
+        The design, whose verified layouts are compared.
+    grounds : int
+        Number of grounds.
+    posterior : Posterior, optional
+        Posterior of a fit, which replaces the plausible range of its numbers.
+    seed : int
+        Seed of the hypercube. The releases are the first of the verification.
+    out : path
+        Folder in which outcomes are kept until `forget` is called.
+    tick : callable
+        Called with the number of grounds so far and a description.
+
+    Raises
+    ------
+    BadInput
+        If the site is invalid at a limit of a number.
+    Diverged
+        If a simulation diverges.
+    """
+    from scipy.stats import qmc  # takes half a second
+
+    problem, asked = done.problem, inputs(done.problem.site, posterior)
+    cube = qmc.LatinHypercube(len(asked), rng=np.random.default_rng(seed)).random(grounds)
+    compared = [case for case in done.cases if case is not done.unchecked]
+    comparable = {case.name for case in done.comparable}
+    layouts = [case.evaluation.layout for case in compared]
+    seeds, events = _seeds(problem, seed), design_events(problem.site)
+    samples = []
+    for i, place in enumerate(cube):
+        tick(i, f"ground {i + 1} of {grounds}")
+        name = f"{problem.site.name}, ground {i + 1}"  # for warnings
+        site = msgspec.structs.replace(site_at(problem.site, asked, place), name=name)
+        found = simulate(site, layouts, seeds, out)
+        pairs = zip(asked, place.tolist(), strict=True)
+        values = {p: v for one, at in pairs for p, v in zip(one.paths, one.at(at), strict=True)}
+        cases = tuple(
+            _case(case.name, site, layout, one)._replace(comparable=case.name in comparable)
+            for case, layout, one in zip(compared, layouts, found, strict=True)
+        )
+        chosen = cases[-1].evaluation
+        targets = problem.targets.state(events, chosen.reach, chosen.failure)
+        samples.append(GroundSample(values, cases, found[0].strata, targets))
+    source = "plausible range of the library of grounds" if posterior is None else "posterior"
+    count = sum(map(len, seeds.values()))
+    return Band(tuple(samples), count, source, events)
+
+
+def _seeds(problem: DesignProblem, seed: int) -> dict[str, Sequence[int]]:
+    """Return the seeds of each event: the first of the verification, distributed as there."""
+    events = len(problem.site.events)
+    count = max(RELEASES, 2 * events)
+    drawn = release_seeds("verification", seed, count)
+    found: dict[str, list[int]] = {name: [] for name in problem.site.event_names}
+    for name, own in zip(problem.plan(drawn), drawn, strict=True):
+        found[name].append(own)
+    return dict(found)
+
+
+def _case(name: str, site: Site, layout: Layout, found: SimulatedSite) -> BandLayout:
+    """Return a layout on one ground."""
+    evaluation = judge(site, layout, found.outcomes, {}, {})
+    return BandLayout(name, evaluation, price(site, layout, found))
+
+
+def forget(out: Path) -> None:
+    """Remove the outcomes of a band whose tables are written."""
+    shutil.rmtree(out / PARTS, ignore_errors=True)

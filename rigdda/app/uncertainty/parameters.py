@@ -1,0 +1,445 @@
+"""Uncertain numbers of a site: their paths in the site file, plausible ranges and values.
+
+A fit searches such numbers, and a sensitivity analysis samples them. The ranges of the ground are
+those of the library of grounds. The ranges of rates, block sizes, prices and consequences are
+factors on the values of the site, see `FACTORS`.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda import BadInput, Layout, Site, check, fields
+from rigdda.files import read as read_text
+from rigdda.ground.grounds import GROUNDS, OTHER, USUAL
+from rigdda.ground.surface import RETIRED
+from rigdda.model.site_tables import VOLUME_EXPONENT, Rebound
+
+Floats = NDArray[np.float64]
+
+RANGES = {
+    "scatter.friction_deg": (0.0, 10.0),
+    "friction_deg": (15.0, 65.0),
+    "restitution": (0.0, 0.8),
+    "rolling": (0.0, 1.0),
+    "motion.damping": (0.0, 3.0),
+    "friction_sd_deg": (0.0, 10.0),
+    "restitution_sd": (0.0, 0.2),
+    "rolling_sd": (0.0, 0.3),
+    "restitution_speed": (2.0, 50.0),
+    "roughness": (0.0, 0.2),
+    "normal": (0.0, 0.8),
+    "tangential": (0.4, 1.0),
+}
+"""Default limits of a parameter of a fit, by its path or by the last name of its path. They are
+wider than the plausible ranges, because observations decide."""
+
+FACTORS = {"rate": 3.0, "size": 2.0, "level": 1.4, "cost": 2.0}
+"""Factor by which a number may be larger or smaller than assumed: the rate of an event, the volume
+of its blocks, the level of the prices of barriers, and a cost or duration of the consequences.
+Inventories of rockfall seldom tell rates better than within a factor of three; all are assumed."""
+
+INTEREST = (0.01, 0.05)
+"""Plausible real rates of interest of public works [1/year]."""
+
+GROUPS = ("ground", "sizes", "rates", "prices")
+"""Groups of parameters that can be named instead of paths."""
+
+
+class Parameter(NamedTuple):
+    """An uncertain number of a site file, such as `surfaces.soil.restitution`.
+
+    Parameters
+    ----------
+    path : str
+        Path of the number. Besides numbers of the file, `events.NAME.size` and `sources.NAME.size`
+        are factors on the volumes of blocks, and `prices.level` is a factor on the prices of all
+        barriers.
+    low, high : float
+        Its limits.
+    logarithmic : bool
+        Whether values are evenly distributed on a logarithmic scale, as factors are.
+    """
+
+    path: str
+    low: float
+    high: float
+    logarithmic: bool = False
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of the numbers that it determines."""
+        return (self.path,)
+
+    def at(self, place: float) -> tuple[float, ...]:
+        """Return its value at a place between 0 (`low`) and 1 (`high`)."""
+        if self.logarithmic:
+            return (self.low * (self.high / self.low) ** place,)
+        return (self.low + (self.high - self.low) * place,)
+
+
+def parse(text: str, known: Mapping[str, Parameter] | None = None) -> Parameter:
+    """Return a parameter written as PATH or PATH=LOW:HIGH.
+
+    Parameters
+    ----------
+    text : str
+        The text.
+    known : mapping of str to Parameter, optional
+        Parameters with limits by their paths; by default the limits are those of `RANGES`.
+
+    Raises
+    ------
+    BadInput
+        If it has another form, or if it has no limits and there are no default limits for it.
+    """
+    path, given, limits = text.partition("=")
+    _check_retired(path)
+    if not given:
+        if known and path in known:
+            return known[path]
+        usual = RANGES.get(path, RANGES.get(path.rpartition(".")[2]))
+        if usual is None:
+            raise BadInput("--parameters", text, f"give limits: {path}=LOW:HIGH")
+        return Parameter(path, *usual)
+    found = re.fullmatch(r"([^:]+):([^:]+)", limits)
+    try:
+        low, high = map(float, found.groups() if found else ())
+    except ValueError:
+        raise BadInput("--parameters", text, f"write {path}=LOW:HIGH") from None
+    if not -math.inf < low < high < math.inf:
+        raise BadInput("--parameters", text, f"write {path}=LOW:HIGH, LOW below HIGH")
+    return Parameter(path, low, high)
+
+
+def _check_retired(path: str) -> None:
+    """Check that a path does not name a former key of a surface or an interface.
+
+    Raises
+    ------
+    BadInput
+        If it does.
+    """
+    top, last = path.partition(".")[0], path.rpartition(".")[2]
+    if top in ("surfaces", "interfaces") and last in RETIRED:
+        mend = f"name {path.rpartition('.')[0]}.{last.replace('damping', 'rolling')}: damping was "
+        raise BadInput("--parameters", path, mend + "replaced by rolling resistance")
+
+
+def check_once(parameters: Sequence[Parameter]) -> None:
+    """Check that each number is named once.
+
+    Raises
+    ------
+    BadInput
+        If one is repeated.
+    """
+    for i, parameter in enumerate(parameters):
+        if parameter.path in (other.path for other in parameters[:i]):
+            raise BadInput("--parameters", parameter.path, "name each number once")
+
+
+def ground(site: Site) -> tuple[Parameter, ...]:
+    """Return rolling resistance, restitution and friction of each surface of the slope.
+
+    The ranges are those of the ground of the surface in the library, or of the ground that a
+    surface with this name usually has. They are extended to contain the value of the site.
+    """
+    found = []
+    for name in dict.fromkeys(site.slope.chain()[1]):
+        surface = site.surfaces[name]
+        spans = GROUNDS[surface.ground or USUAL.get(name, OTHER)]
+        for field in ("rolling", "restitution", "friction_deg"):
+            value, span = getattr(surface, field), getattr(spans, field)
+            if value is not None:
+                path = f"surfaces.{name}.{field}"
+                found.append(Parameter(path, min(span.low, value), max(span.high, value)))
+    return tuple(found)
+
+
+def plausible(site: Site, layout: Layout) -> dict[str, tuple[Parameter, ...]]:
+    """Return the uncertain numbers of a site with a layout by `GROUPS`.
+
+    Numbers without influence are left out: rates and costs of 0, and prices without barriers.
+    """
+    sizes = [_factor(f"events.{e.name}.size", 1.0, "size") for e in site.events if e.area]
+    sized = (s for s in site.sources if s.edges is not None or s.polygon)
+    sizes += [_factor(f"sources.{source.name}.size", 1.0, "size") for source in sized]
+    rates = [_factor(f"events.{e.name}.rate", e.rate, "rate") for e in site.events if e.rate > 0.0]
+    harm = site.consequences
+    money = [
+        _factor(f"consequences.{name}", getattr(harm, name), "cost")
+        for name in ("closure", "days_base", "days_factor", "clearing")
+        if getattr(harm, name) > 0.0
+    ]
+    if layout:
+        low, high = min(INTEREST[0], site.prices.interest), max(INTEREST[1], site.prices.interest)
+        money.append(_factor("prices.level", 1.0, "level"))
+        money.append(Parameter("prices.interest", low, high))
+        if site.prices.removal > 0.0:
+            money.append(_factor("prices.removal", site.prices.removal, "cost"))
+    groups = (ground(site), tuple(sizes), tuple(rates), tuple(money))
+    return dict(zip(GROUPS, groups, strict=True))
+
+
+def _factor(path: str, value: float, kind: str) -> Parameter:
+    """Return a number that may be larger or smaller by a factor of `FACTORS`."""
+    factor = FACTORS[kind]
+    return Parameter(path, value / factor, value * factor, True)
+
+
+def choose(names: Sequence[str], site: Site, layout: Layout) -> tuple[Parameter, ...]:
+    """Return the parameters that are named by groups or as PATH or PATH=LOW:HIGH.
+
+    Without names, all plausible parameters are returned.
+
+    Raises
+    ------
+    BadInput
+        If a name is unknown or repeated, or if the site is invalid at a limit.
+    """
+    groups = plausible(site, layout)
+    known = {parameter.path: parameter for group in groups.values() for parameter in group}
+    found: list[Parameter] = []
+    for name in names or GROUPS:
+        found += groups[name] if name in groups else (parse(name, known),)
+    check_once(found)
+    check_limits(site, found)
+    return tuple(found)
+
+
+def check_limits(site: Site, parameters: Sequence[Parameter]) -> None:
+    """Check that a site is valid at both limits of each parameter.
+
+    Raises
+    ------
+    BadInput
+        If it is not, or there is no such number.
+    """
+    for parameter in parameters:
+        for value in (parameter.low, parameter.high):
+            set_numbers(site, (parameter.path,), (value,))
+
+
+def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[float]) -> Site:
+    """Return a copy of a site with other values of some parameters; see `set_numbers`."""
+    return set_numbers(site, [parameter.path for parameter in parameters], values)
+
+
+def set_numbers(site: Site, paths: Sequence[str], values: Sequence[float]) -> Site:
+    """Return a copy of a site with other values of the numbers with some paths.
+
+    Raises
+    ------
+    BadInput
+        If there is no such number, or if the site is invalid with the value.
+    """
+    tables = msgspec.to_builtins(site)
+    for path, value in zip(paths, values, strict=True):
+        _set(site, tables, path, float(value))
+    return fields.read(Site, tables)
+
+
+def _set(site: Site, tables: dict[str, Any], path: str, value: float) -> None:
+    """Set a number in the tables of a site."""
+    top, last = path.partition(".")[0], path.rpartition(".")[2]
+    _check_retired(path)
+    if path == "motion.damping" and site.motion.damping_when == "contact":
+        mend = "name surfaces.NAME.rolling: damping in contact was replaced by rolling resistance"
+        raise BadInput("--parameters", path, mend)
+    if path == "prices.level":
+        return _scale_prices(tables, value)
+    table = _table(site, tables, path)
+    if last == "size" and table is not None and top in ("events", "sources"):
+        return _scale_blocks(path, top, table, value)
+    own = Rebound.__struct_fields__ if top == "lumped" else ()
+    known = table is not None and (last in table or last in own)
+    if table is None or not known:
+        raise _unknown(path)
+    if isinstance(table.get(last, 0.0), str | dict | list | tuple | bool):
+        raise _unknown(path)
+    table[last] = value
+    return None
+
+
+def _unknown(path: str) -> BadInput:
+    mend = "name a number of the site file, such as surfaces.soil.restitution"
+    return BadInput("--parameters", path, mend)
+
+
+def _table(site: Site, tables: dict[str, Any], path: str) -> dict[str, Any] | None:
+    """Return the table of a site that holds the number with a path, None if there is none."""
+    tops = path.split(".")[:-1]
+    if tops and isinstance(tables.get(tops[0]), list | tuple):  # tables with names, as events
+        name = path.partition(".")[2].rpartition(".")[0]
+        named = (t for t in tables[tops[0]] if isinstance(t, dict) and t.get("name") == name)
+        return next(named, None)
+    table: Any = tables
+    for top in tops:
+        if not isinstance(table, dict):
+            return None
+        if table is tables["lumped"] and top in site.surfaces:
+            table.setdefault(top, {})
+        table = table.get(top)
+    return table if isinstance(table, dict) else None
+
+
+def _scale_prices(tables: dict[str, Any], factor: float) -> None:
+    """Multiply the prices of all barriers by a factor."""
+    prices = tables["prices"]
+    for name in ("fence", "ditch"):
+        prices[name] = {kind: factor * price for kind, price in prices[name].items()}
+    for name in ("fence_base", "ditch_base", "embankment", "concrete"):
+        prices[name] *= factor
+    for mesh in tables["meshes"]:
+        mesh["price"] *= factor
+
+
+def _scale_blocks(path: str, top: str, table: dict[str, Any], factor: float) -> None:
+    """Multiply the volumes of the blocks of an event or a source by a factor."""
+    area, length = factor**VOLUME_EXPONENT, factor ** (VOLUME_EXPONENT / 2.0)
+    if top == "events":
+        if table["area"] is None:
+            mend = f"name sources.{table['source']}.size: the source determines the blocks"
+            raise BadInput("--parameters", path, mend)
+        table["area"] = [area * value for value in table["area"]]
+    elif table["edges"] is not None:
+        table["edges"] = [length * edge for edge in table["edges"]]
+    elif table["block_area"] is not None:
+        table["block_area"] *= area
+    elif table["joints"]:
+        table["joints"] = [j | {"spacing": length * j["spacing"]} for j in table["joints"]]
+    else:
+        mend = "leave it out: the blocks of this source are surveyed, or its events determine them"
+        raise BadInput("--parameters", path, mend)
+
+
+WEIGHT = "weight"
+"""Name of the column of weights in a posterior file."""
+
+
+class Posterior(NamedTuple):
+    """Samples of several numbers of a site from their joint distribution after a fit.
+
+    In a sensitivity analysis it counts as one input, because the numbers depend on one another.
+
+    Parameters
+    ----------
+    paths : tuple of str
+        Paths of the numbers.
+    values : (S, P) array
+        Samples, in the order of their first principal component.
+    weights : (S,) array
+        Their weights, which add up to 1.
+    """
+
+    paths: tuple[str, ...]
+    values: Floats
+    weights: Floats
+
+    @property
+    def path(self) -> str:
+        """Name of the input."""
+        return f"posterior of {', '.join(self.paths)}"
+
+    @classmethod
+    def of(cls, paths: Sequence[str], values: Floats, weights: Floats) -> Posterior:
+        """Return samples in order with weights that add up to 1, without those of weight 0."""
+        kept = weights > 0.0
+        values, weights = values[kept], weights[kept] / weights.sum()
+        spread = values.std(axis=0)
+        scaled = (values - values.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)
+        *_, axes = np.linalg.svd(scaled, full_matrices=False)
+        order = np.argsort(scaled @ axes[0] * np.sign(axes[0][0] or 1.0), kind="stable")
+        return cls(tuple(paths), values[order], weights[order])
+
+    def at(self, place: float) -> tuple[float, ...]:
+        """Return the sample at a place between 0 and 1 in the cumulative weight."""
+        share = np.cumsum(self.weights)
+        i = int(np.searchsorted(share, place * share[-1]))
+        return tuple(self.values[min(i, len(share) - 1)].tolist())
+
+    def interval(self, level: float) -> tuple[Floats, Floats]:
+        """Return the ends (P,) of the central intervals that hold the weight `level`."""
+        tails = 0.5 * (1.0 - level), 0.5 * (1.0 + level)
+        ends = []
+        for tail in tails:
+            each = []
+            for column in self.values.T:
+                order = np.argsort(column, kind="stable")
+                share = np.cumsum(self.weights[order])
+                i = min(int(np.searchsorted(share, tail * share[-1])), len(share) - 1)
+                each.append(column[order][i])
+            ends.append(np.array(each))
+        return ends[0], ends[1]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the rows of its file."""
+        return [
+            {WEIGHT: float(weight)} | dict(zip(self.paths, row.tolist(), strict=True))
+            for weight, row in zip(self.weights, self.values, strict=True)
+        ]
+
+
+def read_posterior(path: Path, site: Site) -> Posterior:
+    """Read a posterior file, as `rigdda fit` writes it.
+
+    Raises
+    ------
+    BadInput
+        If there is no such file, or it is not a table of weights and valid numbers of the site.
+    """
+    if not path.is_file():
+        raise BadInput("--posterior", str(path), "name a file posterior.csv of `rigdda fit`")
+    try:
+        head, *rows = csv.reader(io.StringIO(read_text("--posterior", path), newline=""))
+        table = np.array([[check.parsed(cell) for cell in row] for row in rows], dtype=np.float64)
+    except (ValueError, csv.Error):
+        table, head = np.zeros(0), [""]
+    mend = "give a column weight and one for each number, with finite numbers and weights above 0"
+    if table.ndim != 2 or head[0] != WEIGHT or table.shape[1] != len(head) or len(head) < 2:
+        raise BadInput("--posterior", str(path), mend)
+    if not np.isfinite(table).all() or (table[:, 0] < 0.0).any() or not table[:, 0].any():
+        raise BadInput("--posterior", str(path), mend)
+    check.distinct("--posterior", head)
+    for ends in (table.min(axis=0), table.max(axis=0)):
+        set_numbers(site, head[1:], ends[1:].tolist())
+    return Posterior.of(head[1:], table[:, 1:], table[:, 0])
+
+
+Input = Parameter | Posterior
+"""An input of a sensitivity analysis, with its `path`, `paths` and values `at` a place."""
+
+
+def site_at(site: Site, inputs: Sequence[Input], place: Floats) -> Site:
+    """Return a site with the values of inputs at a place of the unit cube, (D,)."""
+    paths = [path for one in inputs for path in one.paths]
+    values = [v for one, at in zip(inputs, place.tolist(), strict=True) for v in one.at(at)]
+    return set_numbers(site, paths, values)
+
+
+def inputs(
+    names: Sequence[str], site: Site, layout: Layout, posterior: Path | None = None
+) -> tuple[Input, ...]:
+    """Return the inputs of an analysis: those of `choose`, and a posterior instead of its numbers.
+
+    Raises
+    ------
+    BadInput
+        As `choose` and `read_posterior` do.
+    """
+    chosen = choose(names, site, layout)
+    if posterior is None:
+        return chosen
+    joint = read_posterior(posterior, site)
+    return (joint, *(one for one in chosen if one.path not in joint.paths))

@@ -1,0 +1,124 @@
+"""Frontier of a missed target, with its layouts verified on new releases."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cache
+
+from rigdda import Layout
+from rigdda.agents.designers.frontier import TriedLayout, frontier
+from rigdda.agents.designers.menu import on_bound
+from rigdda.agents.designers.protocol import (
+    DesignResult,
+    best_of_finals,
+)
+from rigdda.app.design_study import (
+    VerifiedLayout,
+)
+from rigdda.envs import DesignProblem, Evaluation
+
+MOST_VERIFIED = 8
+"""Largest number of layouts of a frontier that are verified in addition to the others."""
+
+
+Check = Callable[[Layout, str], Evaluation]
+"""Function that evaluates a layout on new releases of a stage: "frontier", by which one of several
+layouts is chosen, or "verification"."""
+
+
+def with_frontier(
+    problem: DesignProblem,
+    result: DesignResult,
+    cases: list[VerifiedLayout],
+    check: Check,
+    searched: bool,
+) -> tuple[DesignResult, tuple[TriedLayout, ...], bool]:
+    """Return a result that misses a target with its verified frontier.
+
+    If the layout was `searched` for, the best of all verified layouts takes its place in the result
+    and in the last of the cases. Its verification has other releases than this choice.
+
+    Returns
+    -------
+    result : DesignResult
+        The result, with what the verification says of the layouts that were tried.
+    frontier : tuple of TriedLayout
+        The frontier.
+    replaced : bool
+        Whether the layout of the result was replaced.
+    """
+    judged = cache(lambda layout: check(layout, "frontier"))
+    known = with_verified_frontier(problem, result.tried, cases, judged)
+    result, front = replace(result, tried=known), frontier(known)
+    if not searched:
+        return result, front, False
+    layouts = [c.evaluation.layout for c in cases[:-1] if problem.fits(c.evaluation.layout)]
+    layouts += [one.layout for one in front if one.verified is not None]
+    layouts.append(cases[-1].evaluation.layout)
+    seen = [judged(layout) for layout in dict.fromkeys(layouts)]
+    best = best_of_finals(problem, seen).layout
+    if best == result.layout:
+        return result, front, False
+    others = {case.evaluation.layout: case.evaluation for case in cases[:-1]}
+    evaluation = others[best] if best in others else check(best, "verification")
+    cases[-1] = VerifiedLayout(cases[-1].name, evaluation)
+    return _with_layout(problem, result, evaluation, list(others)), front, True
+
+
+def with_verified_frontier(
+    problem: DesignProblem,
+    tried: Sequence[TriedLayout],
+    cases: Sequence[VerifiedLayout],
+    check: Callable[[Layout], Evaluation],
+) -> tuple[TriedLayout, ...]:
+    """Return all layouts that were tried, with those of their frontier verified if possible.
+
+    The layout of the frontier with the lowest P(reach) that is not verified is verified, and then
+    the frontier is determined again with its new probabilities, up to `MOST_VERIFIED` times. What
+    the verification says of a layout replaces what the search said.
+
+    Parameters
+    ----------
+    problem : DesignProblem
+        The problem; its site has design events.
+    tried : sequence of TriedLayout
+        All layouts of the search.
+    cases : sequence of VerifiedLayout
+        Layouts that are verified already.
+    check : callable
+        Function that verifies a layout.
+
+    Raises
+    ------
+    BadInput, Diverged
+        The same errors as `check`.
+    """
+    known = {one.layout: one for one in tried}
+    for case in cases:
+        if problem.fits(case.evaluation.layout):
+            one = TriedLayout.of(problem.site, case.evaluation)
+            known[one.layout] = one
+    for _ in range(MOST_VERIFIED):
+        open_ = [one for one in frontier(known.values()) if one.verified is None]
+        if not open_:
+            break
+        layout = min(open_, key=lambda one: one.level).layout
+        known[layout] = TriedLayout.of(problem.site, check(layout))
+    return tuple(known.values())
+
+
+def _with_layout(
+    problem: DesignProblem, result: DesignResult, verified: Evaluation, known: Sequence[Layout]
+) -> DesignResult:
+    """Return a result with another layout and its verified evaluation.
+
+    The layout is one of those that need no search (`known`), or one of the search.
+    """
+    return replace(
+        result,
+        layout=verified.layout,
+        evaluation=verified,
+        origin="start" if verified.layout in known else "search",
+        on_bound=on_bound(problem, verified.layout),
+    )

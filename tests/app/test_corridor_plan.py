@@ -1,0 +1,387 @@
+"""The choice of layouts for a budget, and `rigdda corridor` as users meet it."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+from processes import png_size, refused, rig, rows, run
+from test_report import Page
+
+import rigdda
+from rigdda import BadInput, Corridor, CorridorSection, Ditch, Site, load_layout
+from rigdda.agents.corridor import allocation, planning, programme
+from rigdda.agents.corridor.allocation import Estimates
+from rigdda.agents.corridor.programme import METHODS, Options
+from rigdda.envs import CorridorProblem
+from rigdda.model import corridor as corridors
+
+EXAMPLE = Path(rigdda.__file__).parents[1] / "examples/corridor/pass-road.toml"
+
+Row = list[tuple[float, float]]
+
+
+def options(fronts: list[Row], missed: list[list[float]] | None = None) -> Options:
+    """Return options of sections from pairs of cost and value."""
+    arrays = [np.array([(0.0, 100.0), *row]) for row in fronts]
+    none = [np.zeros(len(own)) for own in arrays]
+    return Options(
+        np.ones(len(arrays)),
+        [own[:, 0] for own in arrays],
+        [0.05 * own[:, 0] for own in arrays],
+        [own[:, 1] for own in arrays],
+        none if missed is None else [np.array(own) for own in missed],
+    )
+
+
+def enumerated(given: Options, budget: float, yearly: float = math.inf) -> float:
+    """Return the least total cost of all choices within the budgets."""
+    found = []
+    for choice in itertools.product(*(range(len(own)) for own in given.values)):
+        within = given.total(choice, given.costs) <= budget * (1.0 + 1e-9)
+        if within and given.total(choice, given.annual) <= yearly * (1.0 + 1e-9):
+            found.append(given.total(choice, given.values))
+    return min(found)
+
+
+number = st.floats(1.0, 100.0).map(lambda value: round(value, 3))
+fronts = st.lists(st.lists(st.tuples(number, number), max_size=4), min_size=1, max_size=4)
+
+
+@settings(max_examples=60, deadline=None)
+@given(fronts, st.floats(0.0, 300.0), st.floats(0.5, 20.0))
+def test_the_optimum_is_that_of_an_enumeration(
+    rows: list[Row], budget: float, yearly: float
+) -> None:
+    given = options(rows)
+    choice = programme.optimum(given, budget, yearly)
+    assert given.total(choice, given.costs) <= budget * (1.0 + 1e-6) + 1e-6
+    best = enumerated(given, budget, yearly)
+    assert given.total(choice, given.values) == pytest.approx(best, rel=1e-5)
+
+
+@settings(max_examples=60, deadline=None)
+@given(fronts, st.floats(0.0, 300.0))
+def test_simple_methods_stay_within_the_budget_and_are_not_better(
+    rows: list[Row], budget: float
+) -> None:
+    given = options(rows)
+    best = enumerated(given, budget)
+    for method in METHODS.values():
+        choice = method(given, budget)
+        assert given.total(choice, given.costs) <= budget * (1.0 + 1e-6) + 1e-6
+        assert given.total(choice, given.values) >= best - 1e-6
+
+
+@settings(max_examples=40, deadline=None)
+@given(fronts, st.floats(1.0, 300.0))
+def test_the_shadow_price_is_the_slope_of_the_linear_relaxation(
+    rows: list[Row], budget: float
+) -> None:
+    given = options(rows)
+
+    def relaxed(money: float) -> float:
+        total = given.total(given.nothing, given.values)
+        for step in programme.increments(given):
+            part = min(1.0, money / step.cost)
+            total -= part * step.saving
+            money -= part * step.cost
+            if money <= 0.0:
+                break
+        return total
+
+    price, step = programme.shadow_price(given, budget), 1e-6 * budget
+    before, after = relaxed(budget - step), relaxed(budget + step)
+    low, high = sorted((relaxed(budget) - after, before - relaxed(budget)))
+    assert low / step - 1e-3 <= price <= high / step + 1e-3
+    slopes = [step.saving / step.cost for step in programme.increments(given)]
+    assert slopes == sorted(slopes, reverse=True) and all(slope > 0.0 for slope in slopes)
+
+
+def test_a_thousand_sections_take_seconds() -> None:
+    rng = np.random.default_rng(0)
+    lengths, costs, values = rng.uniform(50.0, 300.0, 1000), [], []
+    for length in lengths:
+        own = np.sort(np.append(0.0, rng.uniform(50.0, 3000.0, rng.integers(5, 12))))
+        left = np.exp(-own / rng.uniform(200.0, 1500.0)) * rng.uniform(0.8, 1.2, len(own))
+        costs.append(length * own)
+        values.append(length * (rng.lognormal(5.5, 1.0) * left + 0.05 * own))
+    none = [np.zeros(len(own)) for own in costs]
+    given = Options(lengths, costs, [0.05 * own for own in costs], values, none)
+    budget, begun = 200.0 * float(lengths.sum()), time.process_time()
+    choice = programme.optimum(given, budget)
+    assert time.process_time() - begun < 10.0
+    assert given.total(choice, given.costs) <= budget * (1.0 + 1e-6)
+    assert given.gain(choice) >= given.gain(programme.by_ratio(given, budget))
+
+
+def test_missed_targets_come_before_cost() -> None:
+    given = options([[(10.0, 120.0), (30.0, 50.0)]], [[0.2, 0.0, 0.1]])
+    assert programme.optimum(given, 100.0) == (1,)
+    assert programme.optimum(given, 5.0) == (0,)
+
+
+def test_a_robust_choice_avoids_what_may_be_bad() -> None:
+    given = options([[(10.0, 40.0), (10.0, 42.0)]])
+    rng = np.random.default_rng(0)
+    risky = 40.0 + 30.0 * rng.standard_normal(500)
+    scenarios = [np.column_stack([np.full(500, 100.0), risky, np.full(500, 42.0)])]
+    assert programme.optimum(given, 20.0) == (1,)
+    assert programme.optimum(given, 20.0, scenarios=scenarios) == (2,)
+
+
+def section(gaps: list[float], releases: float = 100.0) -> Estimates:
+    """Return estimates of options that cost 0, 100, 200 EUR/m and so on, and save a gap each."""
+    value = 100.0 - np.array([0.0, *gaps])
+    count = len(value)
+    cost = 100.0 * np.arange(count)
+    return Estimates(100.0, cost, value, np.full(count, 2500.0), np.full(count, releases))
+
+
+def test_releases_go_to_the_section_whose_choice_is_uncertain() -> None:
+    clear, close = section([40.0]).worth([0.0]), section([1.0]).worth([0.0])
+    assert close[1] > 100.0 * clear[1]
+    priced = section([40.0]).worth([0.4])  # 100 EUR/m at .4 a year cost as much as they save
+    assert priced[1] > 100.0 * clear[1]
+    found = allocation.batches([section([40.0]), section([1.0])], [0.0], 20 * allocation.BATCH)
+    assert found[1, 1] > 10 and sum(found.values()) == 20
+    assert all(option > 0 for _, option in found)  # no barrier is known already
+
+
+@given(st.lists(st.floats(-50.0, 50.0), min_size=1, max_size=5), st.floats(0.0, 1.0))
+def test_a_batch_never_harms_and_the_next_one_is_worth_less(
+    gaps: list[float], price: float
+) -> None:
+    few, many = section(gaps), section(gaps, 10_000.0)
+    assert (few.worth([price]) >= 0.0).all()
+    assert many.worth([price]).sum() <= few.worth([price]).sum() + 1e-9
+
+
+def test_the_opportunity_cost_is_the_mean_of_what_is_lost() -> None:
+    drawn = np.random.default_rng(0).standard_normal(200_000)
+    expected = np.maximum(-(3.0 + 2.0 * drawn), 0.0).mean()
+    found = allocation.opportunity(np.array([3.0]), np.array([4.0]))
+    assert found[0] == pytest.approx(expected, rel=0.03)
+
+
+TEXT = """name = "pass"
+budget = [4_000, 12_000]
+[[sections]]
+site = "verge"
+length = 100.0
+name = "km 1.2"
+[[sections]]
+site = "narrow"
+length = 50.0
+"""
+SMALL = ("--releases", 300)
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    folder = tmp_path_factory.mktemp("pass")
+    (folder / "pass.toml").write_text(TEXT)
+    words = run("corridor", "pass.toml", *SMALL, "--out", "o", folder=folder)
+    return folder / "o", words
+
+
+def test_the_command_writes_what_its_tables_say(planned: tuple[Path, str]) -> None:
+    out, words = planned
+    budgets = rows(out / "budgets.csv")
+    assert [row["budget"] for row in budgets[::4]] == ["4000.0", "12000.0", "unlimited"]
+    sections = rows(out / "sections.csv")
+    for row in budgets:
+        if row["budget"] != "unlimited":
+            assert float(row["spent"]) <= float(row["budget"]) * (1.0 + 1e-9)
+        low, gain, high = (float(row[name]) for name in ("gain_low", "gain", "gain_high"))
+        assert low <= gain <= high
+    for i, budget in enumerate(("4000.0", "12000.0")):
+        own = [row for row in sections if row["budget"] == budget]
+        best = budgets[4 * i]
+        assert math.fsum(float(row["cost"]) for row in own) == pytest.approx(float(best["spent"]))
+        assert math.fsum(float(row["gain"]) for row in own) == pytest.approx(float(best["gain"]))
+        problem = CorridorProblem(Corridor.load(out.parent / "pass.toml"))
+        names = (out / f"layouts/budget-{i + 1}/section-{s + 1}.toml" for s in range(2))
+        layouts = [load_layout(name) for name in names]
+        assert problem.cost(layouts) == pytest.approx(float(best["spent"]))
+    assert png_size(out / "gain.png")[0] > 500 and png_size(out / "strip.png")[0] > 500
+    assert "km 1.2" in words and "unlimited" in words
+
+
+def test_the_report_shows_what_each_budget_achieves(
+    planned: tuple[Path, str], tmp_path: Path
+) -> None:
+    out, _ = planned
+    run("report", out, "--out", "page", folder=tmp_path)
+    page = Page((tmp_path / "page/report.html").read_text(encoding="utf-8"))
+    assert page.heads[0] == "1. Corridor"
+    for file in ("budgets.csv", "sections.csv"):
+        assert len(page.tables[f"o/{file}"]) == len(rows(out / file))
+    budgets = rows(out / "budgets.csv")
+    for shown, row in zip(page.tables["o/budgets.csv"], budgets, strict=True):
+        assert shown["method"] == row["method"]
+        assert float(shown["spent"].replace(",", "")) == pytest.approx(float(row["spent"]), abs=0.5)
+    labels = {attrs.get("aria-label") for tag, attrs in page.tags if tag == "svg"}
+    assert {"Gain and budget", "What is built along the corridor"} <= labels
+
+
+@pytest.mark.slow
+def test_a_killed_plan_goes_on_and_ends_the_same(planned: tuple[Path, str], tmp_path: Path) -> None:
+    whole, _ = planned
+    (tmp_path / "pass.toml").write_text(TEXT)
+    count, out = _lines(whole / "evaluations"), tmp_path / "killed"
+    for least in (count // 4, count // 2):
+        killed = rig("corridor", "pass.toml", *SMALL, "--out", "killed", folder=tmp_path)
+        while _lines(out / "evaluations") < least:
+            assert killed.poll() is None
+            time.sleep(0.02)
+        killed.kill()
+        killed.communicate()
+    run("corridor", "pass.toml", *SMALL, "--out", "killed", folder=tmp_path)
+    for name in ("budgets.csv", "sections.csv", "fronts.csv", "priorities.csv"):
+        assert (out / name).read_bytes() == (whole / name).read_bytes()
+
+
+def _lines(folder: Path) -> int:
+    """Return the number of stored evaluations."""
+    return sum(file.read_bytes().count(b"\n") for file in folder.glob("*.jsonl"))
+
+
+def test_a_corridor_is_saved_and_read_back(tmp_path: Path) -> None:
+    (tmp_path / "pass.toml").write_text(TEXT)
+    one = Corridor.load(tmp_path / "pass.toml")
+    assert Corridor.load(one.save(tmp_path / "copy")) == one
+
+
+def test_sections_may_stand_in_a_table_and_share_prices(tmp_path: Path) -> None:
+    with (tmp_path / "s.csv").open("w", newline="") as file:
+        csv.writer(file).writerows(
+            [("name", "site", "length", "reach"), ("a", "verge", 10, ""), ("b", "quick", 20, 0.1)]
+        )
+    text = 'name = "t"\nbudget = 1000\ntable = "s.csv"\n[consequences]\nclosure = 7000.0\n'
+    (tmp_path / "t.toml").write_text(text + "[prices]\ninterest = 0.01\n")
+    found = Corridor.load(tmp_path / "t.toml")
+    assert [s.length for s in found.sections] == [10.0, 20.0]
+    assert [s.reach for s in found.sections] == [None, 0.1]
+    assert all(s.site.consequences.closure == 7000.0 for s in found.sections)
+    assert all(s.site.prices.interest == 0.01 for s in found.sections)
+
+
+def test_the_example_has_targets_and_traffic_of_its_sections() -> None:
+    corridor = Corridor.load(EXAMPLE)
+    wanted = [section.targets for section in corridor.sections]
+    assert wanted[1]["reach"] == 0.4 and wanted[3]["individual"] == 1e-5
+    assert all(value is None for value in wanted[0].values())
+    for section in corridor.sections:
+        assert section.site.traffic is not None
+        assert section.site.traffic.section_length == section.length
+    assert CorridorProblem(corridor).problems[3].targets.individual == 1e-5
+
+
+def test_a_target_of_the_risk_to_life_needs_traffic(tmp_path: Path) -> None:
+    text = TEXT.replace("length = 50.0", "length = 50.0\nindividual = 1e-5")
+    (tmp_path / "pass.toml").write_text(text)
+    line = refused("corridor", "pass.toml", folder=tmp_path)
+    assert "sections.narrow.targets.individual" in line and "traffic" in line
+    (tmp_path / "pass.toml").write_text(text + "[traffic]\nspeed = 50.0\n")
+    assert "traffic.vehicles_per_day" in refused("corridor", "pass.toml", folder=tmp_path)
+
+
+def test_options_are_judged_by_the_risk_to_life() -> None:
+    corridor = Corridor.load(EXAMPLE)
+    problem = CorridorProblem(corridor).problems[3]
+    found = problem.evaluate((), range(60))
+    option = planning.Option((), 0.0, 0.0, [found])
+    risk = found.risk.individual.high
+    expected = max(0.0, 1.0 - 1e-5 / risk) if risk > 0.0 else 0.0
+    assert option.missed(problem) == pytest.approx(expected)
+    easy = replace(corridor.sections[3], individual=0.5)
+    one = CorridorProblem(Corridor("one", (easy,), (1.0,))).problems[0]
+    assert option.missed(one) == 0.0
+
+
+def test_the_difference_of_two_choices_is_that_of_the_sections_that_differ(site: Site) -> None:
+    sections = tuple(CorridorSection(site, 40.0 * (i + 1), f"km {i}") for i in range(3))
+    problem = CorridorProblem(Corridor("three", sections, (1e5,)))
+    ditch = (Ditch(site.slope.toe, 1.0, 3.0),)
+    bare, built = (problem.problems[1].evaluate(layout, range(50)) for layout in ((), ditch))
+    first, _, last = (own.nothing for own in problem.problems)
+    one, other = (problem.judge([first, chosen, last]) for chosen in (built, bare))
+    found = problem.ahead(one, other)
+    assert found.value == pytest.approx(80.0 * (bare.objective - built.objective))
+    assert found.low < found.value < found.high
+    assert problem.ahead(one, one) == (0.0, 0.0, 0.0)
+
+
+def test_built_in_corridors_are_valid() -> None:
+    assert corridors.names() == ["corridor-12", "corridor-50"]
+    assert [len(Corridor.load(name).sections) for name in corridors.names()] == [12, 50]
+
+
+@pytest.mark.parametrize(
+    "change, named",
+    [
+        (("budget = [4_000, 12_000]", "budget = []"), ("budget", "at least one")),
+        (("budget = [4_000, 12_000]", "budget = -1"), ("budget", "-1")),
+        (("budget = [4_000, 12_000]", 'budget = "much"'), ("budget", "much")),
+        (("budget = [4_000, 12_000]", ""), ("budget", "no default")),
+        (("length = 50.0", "length = 0"), ("length", "0")),
+        (("length = 50.0", "lenght = 5"), ("lenght", "did you mean length")),
+        (('site = "narrow"', 'site = "nowhere"'), ("site", "nowhere")),
+        (('site = "narrow"', 'site = "gone.toml"'), ("site", "gone.toml")),
+        (('name = "km 1.2"', 'name = "narrow"'), ("sections.name", "narrow")),
+        (("length = 50.0", "length = 50.0\nreach = 2"), ("reach", "2")),
+        (('name = "pass"', 'name = "pass"\ntable = "x.csv"'), ("sections", "table")),
+        (('name = "pass"', 'name = "pass"\nyearly_budget = -2'), ("yearly_budget", "-2")),
+        (('name = "pass"', 'name = "pass"\nprices = {interest = 9}'), ("prices.interest", "9")),
+        (('name = "pass"', 'name = "pass"\nprices = {fenze = 9}'), ("prices.fenze", "fence")),
+    ],
+)
+def test_malformed_corridors_are_one_line(
+    change: tuple[str, str], named: tuple[str, ...], tmp_path: Path
+) -> None:
+    assert change[0] in TEXT
+    (tmp_path / "pass.toml").write_text(TEXT.replace(*change))
+    line = refused("corridor", "pass.toml", folder=tmp_path)
+    assert all(word in line for word in named), line
+
+
+@pytest.mark.parametrize(
+    "text, named",
+    [
+        ("", "row"),
+        ("name,site,length\n", "row"),
+        ("name,site,length\na,quick\n", "cells"),
+        ("name,site,metres\na,quick,3\n", "metres"),
+        ("name,site,length\na,quick,far\n", "far"),
+        ("name,site,length\na,quick,-3\n", "-3"),
+        ("name,site,length\na,quick,1_20\n", "s.csv row 2.length = '1_20': give a number"),
+        ("name,site,length,reach\n\na,quick,5,0_1\n", "s.csv row 3.reach = '0_1': give a number"),
+        ("name,site,length\na,quick,\uff13\n", "row 2.length = .*: give a number"),
+        ("name,site,length\na,quick,1e999\n", "row 2.length = inf: give a finite number"),
+        ("name,site,length,length\na,quick,3,4\n", "table = 'length': .* 2 have this one"),
+        ("name,site, name,length\na,quick,b,4\n", "table = 'name': give each column a different"),
+        ("name,site,length\na,quick,4,5\n", "s.csv row 2 = 4: give 3 cells"),
+        ('name,site,length\n"a,quick,' + 140_000 * "3" + "\n", "repair line 2"),
+    ],
+)
+def test_malformed_tables_are_told(text: str, named: str, tmp_path: Path) -> None:
+    (tmp_path / "s.csv").write_text(text, encoding="utf-8")
+    (tmp_path / "t.toml").write_text('name = "t"\nbudget = 1\ntable = "s.csv"\n')
+    with pytest.raises(BadInput, match=named):
+        Corridor.load(tmp_path / "t.toml")
+
+
+def test_unknown_corridors_and_options(tmp_path: Path) -> None:
+    assert "corridor-12" in refused("corridor", "corridor-13", folder=tmp_path)
+    assert "--budget" in refused("corridor", "corridor-12", "--budget", -1, folder=tmp_path)
+    assert "--releases" in refused("corridor", "corridor-12", "--releases", 5, folder=tmp_path)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,206 @@
+"""Fits to deposits, to blocks that pass a station, and to several files; posteriors."""
+
+from __future__ import annotations
+
+import random
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from processes import refused, rig, rows, run
+
+from rigdda import BadInput, Site
+from rigdda.app.uncertainty import fit
+from rigdda.app.uncertainty.observations import DEPOSIT, RUN_OUT, DataSet, read
+from rigdda.app.uncertainty.parameters import parse, read_posterior, with_values
+from rigdda.app.uncertainty.score_surface import best_places
+from rigdda.passages import passages
+
+SITE = Site.load("quick")
+EDGES = np.array([0.0, 16, 20, 24, 28, 32, 36, 40, 44, 48, 52, 56, 60, 64, 68, 72, 80])
+PATHS = ("surfaces.rock.rolling", "surfaces.rock.restitution")
+TRUE = ((0.1, 0.2), (0.25, 0.3), (0.4, 0.15), (0.3, 0.4), (0.15, 0.45))
+
+
+def deposit(site: Site, first: int, releases: int) -> DataSet:
+    """Return the deposit of single blocks of a site, by mass."""
+    found = passages(site, (), [(s, "block") for s in range(first, first + releases)], ()).stops
+    mass = np.histogram(found["x"], EDGES, weights=found["mass"])[0]
+    return DataSet(DEPOSIT, "block", EDGES, np.nan, mass / mass.sum(), releases)
+
+
+def fitted(i: int, paths: tuple[str, ...], releases: int, budget: int, each: int) -> fit.Fit:
+    """Return the fit to a synthetic deposit."""
+    parameters = [parse(path) for path in paths]
+    real = with_values(SITE, parameters, TRUE[i][: len(paths)])
+    one = deposit(real, 10**6 + 1000 * i, releases)
+    return fit.fit(SITE, {one.name: one}, parameters, budget, each, i, lambda done, words: None)
+
+
+def holds(found: fit.Fit, i: int) -> bool:
+    """Return whether the 90 % intervals of all parameters hold the true values."""
+    low, high = found.posterior.interval(0.9)
+    true = np.array(TRUE[i][: len(low)])
+    return bool(((low <= true) & (true <= high)).all())
+
+
+@pytest.mark.slow
+def test_a_synthetic_deposit_gives_back_its_rolling_resistance() -> None:
+    found = fitted(1, PATHS[:1], 40, 16, 40)
+    assert holds(found, 1)
+    low, high = found.posterior.interval(0.9)
+    assert fit.identified(found) == [True]
+    assert found.low <= low < high <= found.high
+    assert found.posterior.weights.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+def test_fits_find_the_values_of_five_synthetic_deposits() -> None:
+    held = [holds(fitted(i, PATHS[:1], 60, 32, 100), i) for i in range(len(TRUE))]
+    assert sum(held) >= 4
+
+
+def test_blocks_of_a_deposit_count_as_many_as_are_independent() -> None:
+    one = deposit(SITE, 5000, 30)
+    alone = fit.independent_blocks(SITE, one, range(100))
+    assert 8 <= alone <= 30  # unequal blocks tell less by mass than equal ones
+    twice = fit.independent_blocks(SITE, one._replace(releases=60), range(100))
+    assert twice == pytest.approx(2 * alone, abs=1)
+    group = fit.independent_blocks(SITE, one._replace(event="group", releases=30), range(40))
+    assert 0.9 * alone < group < 6 * 30
+    with pytest.raises(BadInput, match="in a column releases"):
+        fit.independent_blocks(SITE, one._replace(releases=1), range(100))
+
+
+def test_the_least_place_of_noisy_scores_is_found_with_its_error() -> None:
+    rng = np.random.default_rng(1)
+    places = rng.random((60, 2))
+    surface = 2.0 + 4.0 * (places[:, 0] - 0.3) ** 2 + (places[:, 1] - 0.6) ** 2
+    scores = surface[:, None] + 0.01 * rng.standard_normal(60)[:, None] * np.ones((1, 200))
+    found = best_places(places, scores, rng)
+    assert found.shape == (200, 2)
+    assert found.mean(axis=0) == pytest.approx([0.3, 0.6], abs=0.06)
+    assert (found.std(axis=0) < 0.15).all() and (found.std(axis=0) > 1e-3).all()
+    low, high = np.quantile(found, (0.025, 0.975), axis=0)
+    assert (low <= [0.3, 0.6]).all() and (high >= [0.3, 0.6]).all()
+
+
+@pytest.mark.slow
+def test_passages_and_run_outs_are_fitted_together(tmp_path: Path) -> None:
+    parameters = [parse("surfaces.rock.rolling")]
+    real = with_values(SITE, parameters, (0.25,))
+    found = passages(real, (), [(s, "block") for s in range(7000, 7040)], [20.0]).table
+    lines = ["event,station_m,quantity,value"]
+    lines += [f"block,20,velocity,{np.hypot(v, w)}" for v, w in found[["vx", "vy"]].tolist()]
+    lines += [f"block,20,height,{h}" for h in found["height"].tolist()]
+    (tmp_path / "passages.csv").write_text("\n".join(lines) + "\n")
+    one = deposit(real, 7000, 40)
+    lines = ["event,start_m,end_m,mass_t,releases"]
+    lines += [
+        f"block,{a},{b},{m},40"
+        for a, b, m in zip(EDGES[:-1], EDGES[1:], 7.0 * one.shares, strict=True)
+    ]
+    (tmp_path / "deposit.csv").write_text("\n".join(lines) + "\n")
+    sets = read([tmp_path / "passages.csv", tmp_path / "deposit.csv"], SITE)
+    names = ["block, velocity at 20 m", "block, height at 20 m", "block, deposit"]
+    assert list(sets) == names
+    assert sets["block, deposit"].shares == pytest.approx(one.shares)
+    got = fit.fit(SITE, sets, parameters, 16, 40, 0, lambda done, words: None)
+    low, high = got.posterior.interval(0.99)
+    assert low[0] <= 0.9 <= high[0] and high[0] - low[0] < 2.0
+    table = {row["what"]: row for row in fit.rows(got, got.observed)}
+    for name in names:
+        row = table[f"mean, {name}"]
+        assert row["fitted"] == pytest.approx(row["observed"], rel=0.35)
+    assert table["mean, block, velocity at 20 m"]["unit"] == "m/s"
+    fit.draw(tmp_path / "fit.png", got)
+    assert (tmp_path / "fit.png").stat().st_size > 5000
+
+
+def test_a_deposit_is_spread_evenly_within_its_intervals() -> None:
+    one = DataSet(DEPOSIT, "block", np.array([0.0, 10.0, 30.0]), np.nan, np.array([0.25, 0.75]), 8)
+    assert one.sample(4).tolist() == pytest.approx([5.0, 10 + 20 / 6, 20.0, 10 + 20 * 5 / 6])
+    assert DataSet(RUN_OUT, "block", np.zeros(3)).name == "block"
+
+
+@pytest.mark.parametrize(
+    "text, named",
+    [
+        ("event,start_m,end_m\nblock,0,9\n", "name its columns"),
+        ("event,start_m,end_m,share,mass_t\nblock,0,9,1,1\n", "name its columns"),
+        ("event,run_out_m,station_m,quantity,value\nblock,1,2,height,3\n", "name its columns"),
+        ("event,start_m,end_m,share\nblock,0,9,1\n", "two intervals or more"),
+        ("event,start_m,end_m,share\nblock,0,9,0\nblock,9,12,0\n", "rock in at least one"),
+        ("event,start_m,end_m,share\nblock,0,9,1\nblock,10,12,1\n", "let it begin at 9"),
+        ("event,start_m,end_m,share\nblock,0,9,1\nblock,8,12,1\n", "let it begin at 9"),
+        ("event,start_m,end_m,share\nblock,9,0,1\nblock,9,12,1\n", "row 1 end_m = 0"),
+        ("event,start_m,end_m,share\nblock,0,9,-1\nblock,9,12,1\n", "row 1 share = -1"),
+        ("event,start_m,end_m,share\nblock,0,9,1\nblock,9,99,1\n", "row 2 end_m = 99"),
+        ("event,start_m,end_m,share,releases\nblock,0,9,1,2\nblock,9,12,1,3\n", "same number"),
+        ("event,start_m,end_m,share,releases\nblock,0,9,1,x\nblock,9,12,1,x\n", "releases = 'x'"),
+        ("event,start_m,end_m,share\nrain,0,9,1\nrain,9,12,1\n", "row 1 event = 'rain'"),
+        ("event,station_m,quantity,value\nblock,20,speed,3\n", "velocity"),
+        ("event,station_m,quantity,value\nblock,500,height,3\n", "station = 500"),
+        ("event,station_m,quantity,value\nblock,20,velocity,-3\n", "row 1 value = -3"),
+        ("event,station_m,quantity,value\nblock,20,velocity,fast\n", "give a number"),
+    ],
+)
+def test_a_table_of_observations_is_checked(text: str, named: str, tmp_path: Path) -> None:
+    (tmp_path / "seen.csv").write_text(text)
+    options = ("--parameters", "surfaces.rock.rolling")
+    line = refused("fit", "quick", "seen.csv", *options, folder=tmp_path)
+    assert named in line
+
+
+def test_points_are_fitted_to_run_outs_only(tmp_path: Path) -> None:
+    (tmp_path / "seen.csv").write_text(
+        "event,station_m,quantity,value\n" + 3 * "block,20,height,1\n"
+    )
+    line = refused("fit", "quick", "seen.csv", "--model", "lumped", "--parameters",
+                   "lumped.rock.normal", folder=tmp_path)  # fmt: skip
+    assert "--model" in line and "use blocks" in line
+
+
+def test_the_same_observations_in_two_files_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "seen.csv").write_text("event,run_out_m\n" + 3 * "block,20\n")
+    line = refused("fit", "quick", "seen.csv", "seen.csv", "--parameters",
+                   "surfaces.rock.rolling", folder=tmp_path)  # fmt: skip
+    assert "in one file only" in line
+
+
+@pytest.mark.slow
+def test_a_killed_fit_goes_on_and_its_posterior_is_sampled(tmp_path: Path) -> None:
+    lines = ["event,start_m,end_m,volume_m3,releases"]
+    one = deposit(SITE, 5000, 30)
+    lines += [
+        f"block,{a},{b},{m},30" for a, b, m in zip(EDGES[:-1], EDGES[1:], one.shares, strict=True)
+    ]
+    (tmp_path / "deposit.csv").write_text("\n".join(lines) + "\n")
+    command = ("fit", "quick", "deposit.csv", "--parameters", PATHS[0], "--budget", 12)
+    command = (*command, "--releases", 20, "--seed", 4, "--out")
+    run(*command, "whole", folder=tmp_path)
+    killed = rig(*command, "killed", folder=tmp_path)
+    least = random.Random(3).randint(1, 9)
+    while len(list((tmp_path / "killed/parts").glob("[!.]*.npz"))) < least:
+        assert killed.poll() is None
+        time.sleep(0.002)
+    killed.kill()
+    killed.communicate()
+    run(*command, "killed", folder=tmp_path)
+    for name in ("fit.csv", "posterior.csv", "site.toml"):
+        assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    assert not (tmp_path / "killed/parts").exists()
+    file = tmp_path / "whole/posterior.csv"
+    joint = read_posterior(file, SITE)
+    row = rows(tmp_path / "whole/fit.csv")[0]
+    low, high = joint.interval(0.95)
+    assert float(row["low"]) <= low[0] and high[0] <= float(row["high"])
+    run("sensitivity", "quick", "--parameters", "ground", "--posterior", file, "--samples", 2,
+        "--releases", 8, "--out", "s", folder=tmp_path)  # fmt: skip
+    table = rows(tmp_path / "s/sensitivity.csv")
+    assert {row["input"] for row in table} == {
+        f"posterior of {PATHS[0]}", PATHS[1], "surfaces.rock.friction_deg",
+    }  # fmt: skip
+    drawn = {float(row[PATHS[0]]) for row in rows(tmp_path / "s/samples.csv")}
+    assert drawn <= set(joint.values[:, 0].tolist())

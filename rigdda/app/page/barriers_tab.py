@@ -22,7 +22,7 @@ from rigdda.app.page.theme import SERIES
 from rigdda.barriers.fence import FENCE_CLASSES
 
 if TYPE_CHECKING:
-    from rigdda.app.page.page import Page
+    from rigdda.app.page.workspace import Host
 
 DRAWN = 60
 """Number of releases whose ways are drawn."""
@@ -42,7 +42,7 @@ class BarriersTab:
 
     title = "Barriers"
 
-    def __init__(self, page: Page):
+    def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.live = page.workspace.live
         self.section = Section(self.theme, "Section with barriers")

@@ -25,7 +25,7 @@ from rigdda.fields import described
 from rigdda.ground.prices import Consequences, Prices
 
 if TYPE_CHECKING:
-    from rigdda.app.page.page import Page
+    from rigdda.app.page.workspace import Host
 
 WIDE = 430
 """Width of the column of prices [pixels]."""
@@ -48,7 +48,7 @@ class DecideTab:
 
     title = "Decide"
 
-    def __init__(self, page: Page):
+    def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.job = page.workspace.search
         self._found: list[Tried] = []

@@ -24,7 +24,7 @@ from rigdda.app.reports.stations import QUANTITIES, Passing
 from rigdda.passages import Passages, passages
 
 if TYPE_CHECKING:
-    from rigdda.app.page.page import Page
+    from rigdda.app.page.workspace import Host
 
 BATCH = 200
 """Number of releases of one press of the button."""
@@ -93,7 +93,7 @@ class FallsTab:
 
     title = "Falls"
 
-    def __init__(self, page: Page):
+    def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.section = Section(self.theme, "Releases; a click on a way replays it", 330)
         self._release: Release | None = None

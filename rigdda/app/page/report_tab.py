@@ -14,7 +14,7 @@ from rigdda.app.page.forms import button, heading, paragraph, text
 from rigdda.app.page.jobs import FAILED, FINISHED, RUNNING
 
 if TYPE_CHECKING:
-    from rigdda.app.page.page import Page
+    from rigdda.app.page.workspace import Host
 
 PAGES = ("report.html", "report.pdf")
 """Files that a report may have."""
@@ -28,7 +28,7 @@ class ReportTab:
 
     title = "Report"
 
-    def __init__(self, page: Page):
+    def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.job, self.study = page.workspace.report, page.workspace.study
         self._count = 0

@@ -14,8 +14,9 @@ from tornado.web import OutputTransform, StaticFileHandler
 
 from rigdda import BadInput
 from rigdda.app.page import theme
-from rigdda.app.page.page import Page, Workspace
+from rigdda.app.page.page import Page
 from rigdda.app.page.state import Project
+from rigdda.app.page.workspace import Workspace
 
 HOST = "127.0.0.1"
 """The only address that the server listens at."""

@@ -22,7 +22,7 @@ from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import spikes
 
 if TYPE_CHECKING:
-    from rigdda.app.page.page import Page
+    from rigdda.app.page.workspace import Host
 
 Path_ = tuple[str | int, ...]
 
@@ -70,7 +70,7 @@ class SlopeTab:
 
     title = "Slope"
 
-    def __init__(self, page: Page):
+    def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.section = Section(self.theme, "Section of the slope", coordinates=True)
         self._showing = False

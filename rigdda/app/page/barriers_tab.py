@@ -15,7 +15,7 @@ from rigdda import Layout
 from rigdda.app.page import placing
 from rigdda.app.page.falls import Fall, Release
 from rigdda.app.page.forms import Bound, button, heading, in_words, number, paragraph, table
-from rigdda.app.page.live import Figures
+from rigdda.app.page.live import LiveFigures
 from rigdda.app.page.placing import Grip
 from rigdda.app.page.section import Section
 from rigdda.app.page.theme import SERIES
@@ -230,7 +230,7 @@ class BarriersTab:
     def _colour(self, fall: Fall) -> str:
         return SERIES[1] if fall.reaches else SERIES[0]
 
-    def _show_figures(self, found: Figures) -> None:
+    def _show_figures(self, found: LiveFigures) -> None:
         """Show the figures of the layout, each with what it is of."""
         self._rules.object = _rules(found, self.theme.bad)
         road = self.project.site.road.start
@@ -288,7 +288,7 @@ def ways(falls: list[Fall], colour: Callable[[Fall], str]) -> dict[str, list[Any
     }
 
 
-def _rules(found: Figures, bad: str) -> str:
+def _rules(found: LiveFigures, bad: str) -> str:
     """Return what forbids the layout, as a list."""
     lines = [*found.broken, *([found.fault] if found.fault else [])]
     if not lines:
@@ -307,14 +307,14 @@ def shown(value: float) -> str:
     return f"{value:,.1f}" if abs(value) >= 100.0 else f"{value:.4g}"
 
 
-def _z(found: Figures) -> str:
+def _z(found: LiveFigures) -> str:
     assert found.costs is not None
     c = found.costs
     low, high = shown(c["objective_low"]), shown(c["objective_high"])
     return f"{shown(c['objective'])} ({low} to {high}), {found.releases:,} releases"
 
 
-def figures_html(found: Figures, bad: str, quiet: str) -> str:
+def figures_html(found: LiveFigures, bad: str, quiet: str) -> str:
     """Return the figures of a layout as HTML tables; those in data attributes have all digits."""
     doing = f"<p style='color:{quiet};margin:2px 0'>{html.escape(found.doing)}&nbsp;</p>"
     head = (
@@ -345,7 +345,7 @@ def figures_html(found: Figures, bad: str, quiet: str) -> str:
     return out
 
 
-def _money(found: Figures) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def _money(found: LiveFigures) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return the head and the rows of the table of Z and its parts."""
     c, bare = found.costs, found.bare
     assert c is not None and bare is not None
@@ -363,7 +363,7 @@ def _money(found: Figures) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     return ("", "this layout", "95 % interval", "without it"), rows
 
 
-def _exact(found: Figures) -> str:
+def _exact(found: LiveFigures) -> str:
     """Return an empty element with all digits of the figures, for programs that read the page."""
     assert found.costs is not None
     data = {f"layout-{k}": v for k, v in found.costs.items() if isinstance(v, float)}
@@ -376,7 +376,7 @@ def _exact(found: Figures) -> str:
     return f"<div hidden>{cells}</div>"
 
 
-def _checks(found: Figures, bad: str) -> str:
+def _checks(found: LiveFigures, bad: str) -> str:
     """Return the uses of all checks, red above their limits."""
     assert found.checks is not None
     rows = []

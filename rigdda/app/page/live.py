@@ -127,7 +127,7 @@ def _joined(parts: list[Account]) -> Account:
     return Account(**{name: column(name) for name in names}, toll=toll)
 
 
-class Figures(NamedTuple):
+class LiveFigures(NamedTuple):
     """What is known of a layout."""
 
     layout: Layout
@@ -186,7 +186,7 @@ class Live:
 
     Attributes
     ----------
-    figures : Figures or None
+    figures : LiveFigures or None
         What is known of the layout that was asked for last; None before the first. It is replaced
         as a whole, so that any thread may read it.
     revision : int
@@ -195,10 +195,10 @@ class Live:
 
     def __init__(self, most: int = ROUNDS[-1]):
         self.most = most
-        self.figures: Figures | None = None
+        self.figures: LiveFigures | None = None
         self.revision = 0
         self._known = _Known()
-        self._ready: dict[Layout, Figures] = {}
+        self._ready: dict[Layout, LiveFigures] = {}
         self._ready_site: Site | None = None
         self._asked: tuple[Site, Layout] | None = None
         self._generation = 0
@@ -215,7 +215,7 @@ class Live:
             self._asked, self._generation = (site, layout), self._generation + 1
             self._wake.notify_all()
 
-    def known(self, site: Site, layout: Layout) -> Figures | None:
+    def known(self, site: Site, layout: Layout) -> LiveFigures | None:
         """Return the figures of a layout that was asked for earlier, if they are remembered."""
         with self._wake:
             return self._ready.get(layout) if self._ready_site == site else None
@@ -240,12 +240,12 @@ class Live:
             try:
                 self._compute(site, layout, done)
             except Error as error:
-                self._show(done, Figures(layout, 0, fault=str(error)))
+                self._show(done, LiveFigures(layout, 0, fault=str(error)))
             except Exception as error:  # the thread lives as long as the page
                 traceback.print_exc()
-                self._show(done, Figures(layout, 0, fault=f"{type(error).__name__}: {error}"))
+                self._show(done, LiveFigures(layout, 0, fault=f"{type(error).__name__}: {error}"))
 
-    def _show(self, generation: int, figures: Figures) -> None:
+    def _show(self, generation: int, figures: LiveFigures) -> None:
         with self._wake:
             if generation == self._generation:
                 self.figures, self.revision = figures, self.revision + 1
@@ -260,7 +260,7 @@ class Live:
     def _compute(self, site: Site, layout: Layout, generation: int) -> None:
         """Compute round after round until there is something else to do."""
         broken = broken_rules(site, layout)
-        shown = Figures(layout, 0, broken=broken, doing="starting")
+        shown = LiveFigures(layout, 0, broken=broken, doing="starting")
         self._show(generation, shown)
         site.realise(layout, 0, site.event_names[0])
         site.capital(layout)
@@ -307,7 +307,7 @@ class Live:
                     yield f"{event}: {len(own):,} of {count:,} releases"
 
 
-def _figures(results: StudyResults, before: Figures, count: int) -> Figures:
+def _figures(results: StudyResults, before: LiveFigures, count: int) -> LiveFigures:
     """Return the figures of the results of a study."""
     rows = study_report.layout_rows(results)
     name = rows[-1]["layout"]

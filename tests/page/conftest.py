@@ -16,7 +16,7 @@ import pytest
 
 from rigdda.app.browser import PROGRAMS
 
-PATIENCE = 120.0
+PATIENCE = 60.0
 RUN = "import sys; from rigdda.app.cli import main; sys.exit(main())"
 
 

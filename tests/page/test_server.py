@@ -49,7 +49,7 @@ def test_only_the_token_the_host_and_the_origin_open_the_page(serve, tmp_path):
     at, token = server.address, urlsplit(server.address).path
     assert at.startswith("http://127.0.0.1:")
     assert len(token) > 30
-    status, headers, body = _get(at, token)
+    status, headers, _ = _get(at, token)
     assert status == 200
     assert HEADERS.items() <= headers.items()
     for path in ("/", "/guess/", "/ws", "/guess/ws", "/static/js/bokeh.min.js", "/report/x"):

@@ -370,7 +370,7 @@ def _exact(found: LiveFigures) -> str:
     for row in found.events:
         data |= {f"{row['event']}-{k}": v for k, v in row.items() if isinstance(v, float | int)}
     cells = "".join(
-        f"<data class='exact' title='{html.escape(k, quote=True)}' value='{v!r}'></data>"
+        f"<data class='exact' title='{html.escape(k, quote=True)}' value='{v}'></data>"
         for k, v in data.items()
     )
     return f"<div hidden>{cells}</div>"

@@ -52,9 +52,7 @@ class Page:
         self._keep = button("Keep what the page shows", self._keep_mine, visible=False)
         self.tabs: list[Tab] = [kind(self) for kind in TABS]
         self._tabs = pn.Tabs(
-            *((tab.title, tab.panel) for tab in self.tabs),
-            sizing_mode="stretch_width",
-            dynamic=True,
+            *((tab.title, tab.panel) for tab in self.tabs), sizing_mode="stretch_width"
         )
         self._tabs.param.watch(lambda _: self._refresh(), "active")
         other = "light" if theme.name == "dark" else "dark"

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 import rigdda
-from rigdda import Error, Layout, Outcome, Site
+from rigdda import BadInput, Error, Layout, Outcome, Site
 from rigdda.app.barrier_checks import LayoutChecks, check_layout
 from rigdda.app.page.placing import kinds_for
 from rigdda.app.reports import study_report
@@ -262,8 +262,12 @@ class Live:
         broken = broken_rules(site, layout)
         shown = LiveFigures(layout, 0, broken=broken, doing="starting")
         self._show(generation, shown)
-        site.realise(layout, 0, site.event_names[0])
-        site.capital(layout)
+        try:
+            site.realise(layout, 0, site.event_names[0])
+            site.capital(layout)
+        except BadInput as bad:
+            self._show(generation, shown._replace(fault=str(bad), doing=""))
+            return
         layouts = study_layouts(layout)
         for count in (n for n in ROUNDS if n <= self.most):
             seen = {name: self._known.of(site, one) for name, one in layouts.items()}

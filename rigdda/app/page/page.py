@@ -54,7 +54,7 @@ class Page:
         self._tabs = pn.Tabs(
             *((tab.title, tab.panel) for tab in self.tabs), sizing_mode="stretch_width"
         )
-        self._tabs.param.watch(lambda _: self._refresh(), "active")
+        self._tabs.param.watch(lambda _: self._later(), "active")
         other = "light" if theme.name == "dark" else "dark"
         link = pn.pane.HTML(
             f"<a href='?theme={other}' style='color:{theme.accent}'>{other} colours</a>",
@@ -67,7 +67,11 @@ class Page:
             sizing_mode="stretch_width",
         )
         self._refresh()
-        pn.state.add_periodic_callback(self._tick, TICK)
+        document = pn.state.curdoc
+        if document is None:  # in a notebook
+            pn.state.add_periodic_callback(self._tick, TICK)
+        else:  # Bokeh locks the document while its own callbacks run
+            document.add_periodic_callback(self._tick, TICK)
 
     @property
     def active(self) -> Tab:
@@ -90,10 +94,10 @@ class Page:
             return False
         except (Error, OSError) as error:
             self._say(str(error), bad=True)
-            self.active.show()
+            self._later()
             return False
         self._say("")
-        self._refresh()
+        self._later()
         return True
 
     def say(self, words: str) -> None:
@@ -114,6 +118,10 @@ class Page:
     def _keep_mine(self) -> None:
         self._reread.visible = self._keep.visible = False
         self.act(self.project.keep_mine)
+
+    def _later(self) -> None:
+        """Show the project at the next tick, which holds the lock of the document."""
+        self._seen = -1
 
     def _tick(self) -> None:
         self._count += 1

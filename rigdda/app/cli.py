@@ -22,6 +22,7 @@ from rigdda.app.commands.exam import exam
 from rigdda.app.commands.fidelity import fidelity
 from rigdda.app.commands.fit import fit
 from rigdda.app.commands.new import new
+from rigdda.app.commands.open import open_page
 from rigdda.app.commands.repeat import repeat
 from rigdda.app.commands.replay import replay
 from rigdda.app.commands.report import report
@@ -100,7 +101,7 @@ def cli(context: click.Context) -> None:
 
 COMMANDS = (
     sites, new, check, schema, simulate, fidelity, replay, repeat, design, report, reprice, study,
-    corridor, fit, sensitivity, train, evaluate, exam, dataset, validate,
+    corridor, fit, sensitivity, train, evaluate, exam, dataset, validate, open_page,
 )  # fmt: skip
 """All commands."""
 

@@ -21,7 +21,7 @@ TINY = ("--budget", "400", "--verify", "40", "--ground-samples", "0")
 COMMANDS = (
     "sites", "new", "check", "simulate", "design", "reprice", "report", "study", "corridor", "fit",
     "sensitivity", "train", "evaluate", "exam", "dataset", "fidelity", "validate", "replay",
-    "repeat",
+    "repeat", "open",
 )  # fmt: skip
 FILES = (
     "evaluations.csv", "evaluations.jsonl", "outcomes.msgpack.gz", "layouts.csv", "chances.csv",

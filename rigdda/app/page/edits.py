@@ -1,0 +1,126 @@
+"""Edits of the text of a site file, which keep its comments and its order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from rigdda import BadInput
+
+Path = Sequence[str | int]
+"""Keys of tables and places in lists that lead to a value, such as ("sources", 0, "band")."""
+
+
+def dotted(path: Path) -> str:
+    """Return a path as messages write it."""
+    out = ""
+    for key in path:
+        out += f"[{key}]" if isinstance(key, int) else f".{key}" if out else key
+    return out
+
+
+def with_value(text: str, path: Path, value: Any) -> str:
+    """Return the text of a TOML file with another value at a path.
+
+    Parameters
+    ----------
+    text : str
+        Text of the file.
+    path : sequence of str and int
+        Where the value is. Tables on the way are added if they are missing.
+    value : object
+        The value, of the types of TOML; None removes the key.
+
+    Raises
+    ------
+    BadInput
+        If the text is not TOML, or the path does not lead to a table or a list in it.
+    """
+    return with_values(text, {tuple(path): value})
+
+
+def with_values(text: str, values: Mapping[tuple[str | int, ...], Any]) -> str:
+    """Return the text of a TOML file with other values at several paths; see `with_value`."""
+    document = _parsed(text)
+    for path, value in values.items():
+        _set(document, path, value)
+    return tomlkit.dumps(document)
+
+
+def with_table(text: str, name: str, values: Mapping[str, Any]) -> str:
+    """Return the text of a TOML file with another table at the end of a list of tables.
+
+    Raises
+    ------
+    BadInput
+        If the text is not TOML, or the name is not that of a list of tables in it.
+    """
+    document = _parsed(text)
+    tables = document.get(name)
+    if tables is None:
+        tables = document[name] = tomlkit.aot()
+    if not isinstance(tables, list):
+        raise BadInput(name, type(tables).__name__, "make it a list of tables, [[...]]")
+    table = tomlkit.table()
+    table.update(values)
+    tables.append(table)
+    return tomlkit.dumps(document)
+
+
+def without(text: str, path: Path) -> str:
+    """Return the text of a TOML file without a key, or without an item of a list.
+
+    Raises
+    ------
+    BadInput
+        If the text is not TOML, or there is nothing at the path.
+    """
+    document = _parsed(text)
+    parent = _inner(document, path, path[:-1])
+    try:
+        del parent[path[-1]]
+    except (KeyError, IndexError, TOMLKitError):
+        raise BadInput(dotted(path), None, "name something that the file has") from None
+    return tomlkit.dumps(document)
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return tomlkit.parse(text)
+    except TOMLKitError as error:
+        raise BadInput("site file", "its text", f"correct its TOML: {error}") from None
+
+
+def _set(document: Any, path: Path, value: Any) -> None:
+    """Set one value in a document, or remove it."""
+    for end in range(1, len(path)):
+        if isinstance(path[end], str):
+            parent = _inner(document, path, path[: end - 1])
+            key = path[end - 1]
+            if isinstance(key, str) and key not in parent:
+                parent[key] = tomlkit.table()
+    parent, key = _inner(document, path, path[:-1]), path[-1]
+    if value is None:
+        if isinstance(key, str):
+            parent.pop(key, None)
+        return
+    try:
+        parent[key] = value
+    except (IndexError, KeyError, TypeError, TOMLKitError):
+        raise BadInput(dotted(path), value, "name a place that the file has") from None
+
+
+def _inner(document: Any, path: Path, part: Path) -> Any:
+    """Return the table or list at the beginning `part` of a path."""
+    found = document
+    for key in part:
+        try:
+            found = found[key]
+        except (KeyError, IndexError, TypeError, TOMLKitError):
+            raise BadInput(dotted(path), None, "name a place that the file has") from None
+    if not isinstance(found, dict | list):
+        raise BadInput(dotted(path), str(found), "name a table or a list")
+    return found

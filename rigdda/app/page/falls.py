@@ -1,0 +1,192 @@
+"""Releases for the page: paths of blocks that a thread computes, and where the blocks end."""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigdda import Error, Layout, Site, Trajectories, trajectory_parts
+from rigdda.envs.intervals import Estimate, estimate
+from rigdda.trajectory import Place, PointKind
+
+Floats = NDArray[np.float64]
+
+ENDS = {
+    Place.NEVER_LEFT: "never leaves",
+    Place.SLOPE: "stops on the slope",
+    Place.HELD: "held by a barrier or ditch",
+    Place.ROAD: "stops on the road",
+    Place.BEYOND: "passes the road",
+}
+"""Where a block ends, in words."""
+
+SIZE = 10
+"""Number of releases that appear together."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fall:
+    """The path of one block.
+
+    Parameters
+    ----------
+    event : str
+        Name of the event.
+    seed : int
+        Seed of the release.
+    found : Trajectories
+        The trajectories that hold the path.
+    path : int
+        Its index in them.
+    """
+
+    event: str
+    seed: int
+    found: Trajectories
+    path: int
+
+    @property
+    def x(self) -> Floats:
+        """Chainages of the points of the path [m]."""
+        return self.found.x[self.found.points(self.path)]
+
+    @property
+    def y(self) -> Floats:
+        """Elevations of the points of the path [m]."""
+        return self.found.y[self.found.points(self.path)]
+
+    @property
+    def speed(self) -> Floats:
+        """Speeds of the centroid at the points [m/s]."""
+        own = self.found.points(self.path)
+        return np.hypot(self.found.vx[own], self.found.vy[own])
+
+    @property
+    def energy(self) -> Floats:
+        """Kinetic energies of the whole block at the points [kJ]."""
+        return 1e-3 * self.found.energy[self.found.points(self.path)]
+
+    @property
+    def duration(self) -> float:
+        """Time at the end [s]."""
+        return float(self.found.time[self.found.points(self.path)][-1])
+
+    @property
+    def end(self) -> str:
+        """Where it ends, in words."""
+        return ENDS[Place(int(self.found.place[self.path]))]
+
+    @property
+    def reaches(self) -> bool:
+        """Whether its centroid ever passes the uphill edge of the road."""
+        return bool(self.found.reached[self.path])
+
+    @property
+    def impacts(self) -> tuple[Floats, Floats]:
+        """Chainages and elevations of the centroid at impacts [m]."""
+        own = self.found.points(self.path)
+        hits = self.found.kind[own] == PointKind.IMPACT
+        return self.x[hits], self.y[hits]
+
+    def outline(self, time: float) -> Floats:
+        """Return the corners of the block at a time [s], (n, 2) [m]."""
+        x, y, turn = self.found.states(self.path, [time])[0, :3]
+        x0, y0, before = self.found.states(self.path, [0.0])[0, :3]
+        cos, sin = np.cos(turn - before), np.sin(turn - before)
+        arm = self.found.vertices[self.path] - np.array([x0, y0])
+        turned: Floats = arm @ np.array([[cos, sin], [-sin, cos]]) + np.array([x, y])
+        return turned
+
+
+def falls_of(site: Site, found: Trajectories) -> list[Fall]:
+    """Return the paths of some trajectories one by one."""
+    names = site.event_names
+    return [
+        Fall(names[int(found.event[r])], found.seed[r], found, path)
+        for path, r in enumerate(found.release.tolist())
+    ]
+
+
+def shares(falls: Sequence[Fall]) -> dict[str, Estimate]:
+    """Return the share of blocks with each end, with its interval."""
+    ends = [fall.end for fall in falls]
+    return {end: estimate(ends.count(end), len(ends)) for end in ENDS.values()}
+
+
+class Release:
+    """Releases of an event that a thread computes, which can be stopped.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    layout : Layout
+        The barriers.
+    event : str
+        Name of the event.
+
+    Attributes
+    ----------
+    falls : list of Fall
+        What is computed so far; it only grows.
+    done, asked : int
+        Number of releases that are computed, with seeds from 0, and that were asked for.
+    fault : str
+        Why the computing ended early; empty if it did not.
+    """
+
+    def __init__(self, site: Site, layout: Layout, event: str):
+        self.site, self.layout, self.event = site, layout, event
+        self.falls: list[Fall] = []
+        self.done = self.asked = 0
+        self.fault = ""
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    @property
+    def running(self) -> bool:
+        """Whether releases are being computed."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def more(self, count: int) -> None:
+        """Compute more releases."""
+        self.asked += count
+        if not self.running:
+            self._stop.clear()
+            self._thread = threading.Thread(target=self._work, name="releases", daemon=True)
+            self._thread.start()
+
+    def stop(self) -> None:
+        """Stop after the releases that are being computed."""
+        self._stop.set()
+
+    def join(self) -> None:
+        """Wait until the releases that were asked for are computed."""
+        if self._thread is not None:
+            self._thread.join()
+
+    def _work(self) -> None:
+        try:
+            while self.done < self.asked and not self._stop.is_set():
+                self._compute(range(self.done, self.asked))
+        except Error as error:
+            self.fault = str(error)
+        except Exception as error:  # shown on the page
+            traceback.print_exc()
+            self.fault = f"{type(error).__name__}: {error}"
+        self.asked = self.done
+
+    def _compute(self, seeds: range) -> None:
+        """Compute releases until they are done or stopped."""
+        parts = trajectory_parts(self.site, self.layout, self.event, seeds, size=SIZE)
+        for found in parts:
+            self.falls += falls_of(self.site, found)
+            self.done += len(found.seed)
+            if self._stop.is_set():
+                parts.close()  # type: ignore[attr-defined]  # it is a generator
+                return

@@ -1,0 +1,156 @@
+"""The page of one tab of the browser: its head, its tabs, and what all of them share."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+
+import panel as pn
+
+from rigdda import BadInput, Error
+from rigdda.app.page.barriers_tab import BarriersTab
+from rigdda.app.page.decide_tab import DecideTab
+from rigdda.app.page.falls_tab import FallsTab
+from rigdda.app.page.forms import button
+from rigdda.app.page.report_tab import ReportTab
+from rigdda.app.page.slope_tab import SlopeTab
+from rigdda.app.page.state import Conflict
+from rigdda.app.page.theme import Theme
+from rigdda.app.page.workspace import Tab, Workspace
+
+TICK = 100
+"""Milliseconds between two looks at what has changed."""
+
+RARELY = 10
+"""Number of such looks between two looks at the files on disk."""
+
+
+TABS = (SlopeTab, FallsTab, BarriersTab, DecideTab, ReportTab)
+"""The tabs in the order of use."""
+
+
+class Page:
+    """The page of one tab of the browser.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        What all tabs share.
+    theme : Theme
+        The colours.
+    """
+
+    def __init__(self, workspace: Workspace, theme: Theme):
+        self.workspace, self.project, self.theme = workspace, workspace.project, theme
+        self._seen = -1
+        self._count = 0
+        self._message = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
+        self._title = pn.pane.HTML("", margin=(6, 8), sizing_mode="stretch_width")
+        self._undo = button("Undo", lambda: self.act(self.project.undo), width=90)
+        self._redo = button("Redo", lambda: self.act(self.project.redo), width=90)
+        self._reread = button("Read the file again", self._read_again, visible=False)
+        self._keep = button("Keep what the page shows", self._keep_mine, visible=False)
+        self.tabs: list[Tab] = [kind(self) for kind in TABS]
+        self._tabs = pn.Tabs(
+            *((tab.title, tab.panel) for tab in self.tabs), sizing_mode="stretch_width"
+        )
+        self._tabs.param.watch(lambda _: self._later(), "active")
+        other = "light" if theme.name == "dark" else "dark"
+        link = pn.pane.HTML(
+            f"<a href='?theme={other}' style='color:{theme.accent}'>{other} colours</a>",
+            margin=(10, 12), width=100,
+        )  # fmt: skip
+        self.panel = pn.Column(
+            pn.Row(self._title, self._undo, self._redo, link, sizing_mode="stretch_width"),
+            pn.Row(self._message, self._reread, self._keep, sizing_mode="stretch_width"),
+            self._tabs,
+            sizing_mode="stretch_width",
+        )
+        self._refresh()
+        document = pn.state.curdoc
+        if document is None:  # in a notebook
+            pn.state.add_periodic_callback(self._tick, TICK)
+        else:  # Bokeh locks the document while its own callbacks run
+            document.add_periodic_callback(self._tick, TICK)
+
+    @property
+    def active(self) -> Tab:
+        """The tab that is shown."""
+        return self.tabs[self._tabs.active]
+
+    def act(self, do: Callable[[], object]) -> bool:
+        """Do something to the project, show its error if there is one, and what has changed.
+
+        Returns
+        -------
+        bool
+            Whether it was done.
+        """
+        try:
+            do()
+        except Conflict as error:
+            self._say(str(error), bad=True)
+            self._reread.visible = self._keep.visible = True
+            return False
+        except (Error, OSError) as error:
+            self._say(str(error), bad=True)
+            self._later()
+            return False
+        self._say("")
+        self._later()
+        return True
+
+    def say(self, words: str) -> None:
+        """Show a message in the head of the page."""
+        self._say(words)
+
+    def _say(self, words: str, bad: bool = False) -> None:
+        role = "alert" if bad else "status"
+        colour = self.theme.bad if bad else self.theme.text
+        self._message.object = (
+            f"<div role='{role}' style='color:{colour}'>{html.escape(words)}</div>" if words else ""
+        )
+
+    def _read_again(self) -> None:
+        self._reread.visible = self._keep.visible = False
+        self.act(self.project.refresh)
+
+    def _keep_mine(self) -> None:
+        self._reread.visible = self._keep.visible = False
+        self.act(self.project.keep_mine)
+
+    def _later(self) -> None:
+        """Show the project at the next tick, which holds the lock of the document."""
+        self._seen = -1
+
+    def _tick(self) -> None:
+        self._count += 1
+        if self._count % RARELY == 0 and not self._keep.visible:
+            try:
+                if self.project.refresh():
+                    self._say("another program has changed a file; it was read again")
+            except BadInput as bad:
+                self._say(f"another program has changed a file: {bad}", bad=True)
+                self._reread.visible = self._keep.visible = True
+        if self._seen != self.project.revision:
+            self._refresh()
+        self.workspace.write_study()
+        self.active.tick()
+
+    def _refresh(self) -> None:
+        """Show the project as it is in the head and in the tab that is open."""
+        project = self.project
+        self._seen = project.revision
+        name = project.site.name if project.has_site else "no site yet"
+        where = str(project.where.site)
+        quiet = f"color:{self.theme.quiet};font-size:13px"
+        self._title.object = (
+            f"<h1 style='font-size:19px;margin:0;display:inline'>{html.escape(name)}</h1> "
+            f"<span style='{quiet}'>{html.escape(where)}</span>"
+        )
+        self._undo.disabled, self._redo.disabled = not project.undoes, not project.redoes
+        self._undo.description = f"Undo: {project.undoes}" if project.undoes else None
+        self._redo.description = f"Redo: {project.redoes}" if project.redoes else None
+        if project.has_site:
+            self.workspace.live.ask(project.site, project.layout)
+        self.active.show()

@@ -1,0 +1,110 @@
+"""The tab Report: a report of the results in the project, as HTML and PDF."""
+
+from __future__ import annotations
+
+import html
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import panel as pn
+
+from rigdda import BadInput
+from rigdda.agents.run_record import RECORD_FILE as RECORD
+from rigdda.app.page.forms import button, heading, paragraph, text
+from rigdda.app.page.jobs import FAILED, FINISHED, RUNNING
+
+if TYPE_CHECKING:
+    from rigdda.app.page.workspace import Host
+
+PAGES = ("report.html", "report.pdf")
+"""Files that a report may have."""
+
+SLOW = 5
+"""Number of looks of the page between two looks at the report."""
+
+
+class ReportTab:
+    """The tab Report."""
+
+    title = "Report"
+
+    def __init__(self, page: Host):
+        self.page, self.project, self.theme = page, page.project, page.theme
+        self.job, self.study = page.workspace.report, page.workspace.study
+        self._count = 0
+        self._results = pn.widgets.CheckBoxGroup(name="Results", options=[])
+        self._pdf = pn.widgets.Checkbox(name="Print it to PDF as well", value=True)
+        self._write = button("Write the report", self._begin, primary=True)
+        self._again = button("Compute the results of this layout", self._compute)
+        self._status = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
+        self.panel = pn.Column(
+            heading("What goes into the report"),
+            text("Results are in folders of the project. A search writes one; the button computes "
+                 "another of the present layout, compared with the slope without it."),
+            self._again, self._results, self._pdf, self._write, self._status,
+            sizing_mode="stretch_width",
+        )  # fmt: skip
+
+    def show(self) -> None:
+        """Show the results that there are."""
+        found = sorted(file.parent.name for file in self.project.folder.glob(f"*/{RECORD}"))
+        found = [name for name in found if name != self.page.workspace.report_folder.name]
+        if self._results.options != found:
+            new = [name for name in found if name not in self._results.options]
+            kept = [name for name in self._results.value if name in found]
+            self._results.options = found
+            self._results.value = kept + new
+        self._look()
+
+    def tick(self) -> None:
+        """Show whether the report is written."""
+        self._count += 1
+        if self._count % SLOW == 0:
+            self.show()
+
+    def _compute(self) -> None:
+        def start() -> None:
+            workspace = self.page.workspace
+            if not (self.project.folder / workspace.study_file).is_file():
+                raise BadInput("results", None, "wait until the tab Barriers shows figures")
+            self.study.start(workspace.study_arguments)
+
+        self.page.act(start)
+
+    def _begin(self) -> None:
+        def start() -> None:
+            if not self._results.value:
+                raise BadInput("results", [], "choose at least one folder of results")
+            folders = [str(self.project.folder / name) for name in self._results.value]
+            out = self.page.workspace.report_folder
+            pdf = ["--pdf"] if self._pdf.value else []
+            self.job.start(["report", *folders, "--out", str(out), *pdf])
+
+        self.page.act(start)
+
+    def _look(self) -> None:
+        lines = []
+        for job, words in ((self.study, "the results of this layout"), (self.job, "the report")):
+            state = job.state
+            if state == RUNNING:
+                lines.append(paragraph(f"Computing {words}. {job.line}"))
+            elif state == FAILED:
+                lines.append(paragraph(f"{words.capitalize()} failed: {job.words}"))
+        if self.job.state == FINISHED:
+            lines += [self._link(self.page.workspace.report_folder / name) for name in PAGES]
+        if self.job.command:
+            lines.append(f"<code>{html.escape(self.job.command)}</code>")
+        self._status.object = "".join(lines)
+        self._write.disabled = self.job.state == RUNNING
+        self._again.disabled = self.study.state == RUNNING
+
+    def _link(self, file: Path) -> str:
+        """Return a link to a file of the report, if there is one."""
+        if not file.is_file():
+            return ""
+        stamp: Any = file.stat().st_mtime_ns
+        style = f"color:{self.theme.accent}"
+        return (
+            f"<p><a style='{style}' target='_blank' rel='noopener' "
+            f"href='report/{file.name}?{stamp}'>Open {file.name}</a></p>"
+        )

@@ -1,0 +1,207 @@
+"""The section of a slope as a Bokeh figure to scale, with ground, road, barriers and ways."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import groupby, pairwise
+from typing import Any
+
+import numpy as np
+from bokeh.models import ColumnDataSource, HoverTool, Range1d
+from bokeh.plotting import figure
+
+from rigdda import BadInput, Layout, Site
+from rigdda.app.page.theme import Theme
+from rigdda.app.reports.pictures import sources
+from rigdda.barriers import Earthwork, earthworks
+from rigdda.model.survey import spikes
+
+MARGIN = 0.06
+"""Share of the length and the height of the ground that is free around it."""
+
+HEIGHT = 400
+"""Height of the figure [pixels]."""
+
+
+def plain_axes(plot: Any, theme: Theme) -> None:
+    """Give a figure the colours of the page."""
+    plot.background_fill_color = plot.border_fill_color = theme.paper
+    plot.outline_line_color = None
+    plot.grid.grid_line_color = theme.grid
+    for axis in plot.axis:
+        axis.axis_line_color = axis.major_tick_line_color = theme.quiet
+        axis.minor_tick_line_color = None
+        axis.major_label_text_color = theme.quiet
+        axis.axis_label_text_color = theme.text
+        axis.axis_label_text_font_style = "normal"
+    for legend in plot.legend:
+        legend.background_fill_color = theme.paper
+        legend.background_fill_alpha = 0.8
+        legend.label_text_color = theme.text
+        legend.border_line_color = None
+
+
+class Section:
+    """A figure of the slope.
+
+    Parameters
+    ----------
+    theme : Theme
+        The colours.
+    name : str
+        Title of the figure.
+    height : int
+        Its height [pixels].
+    coordinates : bool
+        Whether it shows the coordinates and the inclination of the ground under the cursor.
+
+    Attributes
+    ----------
+    plot : bokeh.plotting.figure
+        The figure.
+    """
+
+    def __init__(self, theme: Theme, name: str, height: int = HEIGHT, coordinates: bool = False):
+        self.theme, self._coordinates = theme, coordinates
+        self.plot = figure(
+            height=height, sizing_mode="stretch_width", match_aspect=True,
+            tools="pan,wheel_zoom,box_zoom,reset", active_scroll="wheel_zoom", active_drag="pan",
+            x_axis_label="chainage [metres]", y_axis_label="elevation [metres]",
+            toolbar_location="right", name=name,
+        )  # fmt: skip
+        self.plot.toolbar.logo = None
+        self.plot.title.text = name
+        self.plot.title.text_color = theme.text
+        self.plot.title.text_font_style = "normal"
+        self._ground = ColumnDataSource({"xs": [], "ys": [], "colour": [], "ground": []})
+        self._line = ColumnDataSource({"x": [], "y": [], "slope": []})
+        self._road = ColumnDataSource({"x": [], "y": []})
+        self._zone = ColumnDataSource({"xs": [], "ys": []})
+        self._rock = ColumnDataSource({"xs": [], "ys": []})
+        self._standing = ColumnDataSource({"xs": [], "ys": [], "colour": [], "words": []})
+        self._odd = ColumnDataSource({"x": [], "y": [], "words": []})
+        self.ways = ColumnDataSource({"xs": [], "ys": [], "colour": [], "words": []})
+        self._draw()
+        plain_axes(self.plot, theme)
+        self.plot.legend.location = "top_right"
+        self.plot.legend.click_policy = "hide"
+        self.plot.legend.label_text_font_size = "12px"
+
+    def _draw(self) -> None:
+        plot, theme = self.plot, self.theme
+        plot.patches("xs", "ys", source=self._ground, fill_color="colour", line_color="colour")
+        self.ways_renderer = plot.multi_line(
+            "xs", "ys", source=self.ways, line_color="colour", line_width=1.2, line_alpha=0.75
+        )
+        self.ways_renderer.nonselection_glyph = None
+        line = plot.line("x", "y", source=self._line, line_color=theme.text, line_width=1.5)
+        plot.line("x", "y", source=self._road, line_color=theme.road, line_width=7,
+                  legend_label="road")  # fmt: skip
+        plot.multi_line("xs", "ys", source=self._zone, line_color=theme.accent, line_width=3,
+                        line_dash="4 3", legend_label="barriers may stand")  # fmt: skip
+        plot.multi_line("xs", "ys", source=self._rock, line_color=theme.rock, line_width=5,
+                        legend_label="rock starts here")  # fmt: skip
+        plot.patches("xs", "ys", source=self._standing, fill_color="colour", line_color="colour",
+                     line_width=3)  # fmt: skip
+        odd = plot.scatter("x", "y", source=self._odd, marker="x", size=15, line_width=3,
+                           line_color=theme.bad)  # fmt: skip
+        plot.add_tools(
+            HoverTool(renderers=[odd], description="outliers", tooltips=[("doubtful", "@words")])
+        )
+        if self._coordinates:
+            plot.add_tools(
+                HoverTool(
+                    renderers=[line], mode="vline", line_policy="prev", description="coordinates",
+                    tooltips=[("chainage", "$x{0.00} metres"), ("elevation", "$y{0.00} metres"),
+                              ("slope here", "@slope{0.0} degrees")],
+                )
+            )  # fmt: skip
+
+    def show(self, site: Site, layout: Layout = ()) -> None:
+        """Draw a site and a layout; a barrier that cannot stand is left out."""
+        self._show_ground(site)
+        ground = site.profile
+        x = np.array(site.slope.points)[:, 0]
+
+        def line(start: float, end: float, up: float = 0.0) -> tuple[list[float], list[float]]:
+            inner = sorted(at for at in x.tolist() if start < at < end)
+            at = [start, *inner, end]
+            return at, [ground.height(one) + up for one in at]
+
+        tall = float(np.ptp(np.array(site.slope.points)[:, 1]))
+        self._road.data = dict(zip("xy", line(site.road.start, site.road.end), strict=True))
+        rooms = [line(low, high, 0.02 * tall) for low, high in site.rooms]
+        self._zone.data = {"xs": [a for a, _ in rooms], "ys": [b for _, b in rooms]}
+        rock = sources(site)
+        self._rock.data = {"xs": [r[:, 0] for r in rock], "ys": [r[:, 1] for r in rock]}
+        found = spikes(np.array(site.slope.points, dtype=np.float64))
+        self._odd.data = {
+            "x": [site.slope.points[k][0] for k, _ in found],
+            "y": [site.slope.points[k][1] for k, _ in found],
+            "words": [f"{abs(h):.1f} metres off both neighbours" for _, h in found],
+        }
+        self._show_barriers(site, layout)
+
+    def _show_ground(self, site: Site) -> None:
+        points, names = site.slope.chain()
+        low = min(y for _, y in points)
+        bottom = low - 0.12 * (max(y for _, y in points) - low)
+        used = list(dict.fromkeys(names))
+        colours = self.theme.grounds
+        data: dict[str, list[Any]] = {"xs": [], "ys": [], "colour": [], "ground": []}
+        k = 0
+        for name, group in groupby(names):
+            count = len(list(group))
+            piece = points[k : k + count + 1]
+            k += count
+            data["xs"].append([x for x, _ in piece] + [piece[-1][0], piece[0][0]])
+            data["ys"].append([y for _, y in piece] + [bottom, bottom])
+            data["colour"].append(colours[used.index(name) % len(colours)])
+            data["ground"].append(name)
+        self._ground.data = data
+        angle = [math.degrees(math.atan2(a[1] - b[1], b[0] - a[0])) for a, b in pairwise(points)]
+        self._line.data = {
+            "x": [x for x, _ in points], "y": [y for _, y in points], "slope": [*angle, angle[-1]],
+        }  # fmt: skip
+
+    def _show_barriers(self, site: Site, layout: Layout) -> None:
+        data: dict[str, list[Any]] = {"xs": [], "ys": [], "colour": [], "words": []}
+        for barrier, outline, words in outlines(site, layout):
+            data["xs"].append(outline[:, 0])
+            data["ys"].append(outline[:, 1])
+            data["colour"].append(self.theme.accent if barrier in layout else self.theme.quiet)
+            data["words"].append(words)
+        self._standing.data = data
+
+
+def outlines(site: Site, layout: Layout) -> list[tuple[Any, Any, str]]:
+    """Return the barriers that stand with a layout, each with its outline and its label.
+
+    A barrier that cannot stand where it is, or removes what is not there, is left out.
+    """
+    try:
+        built = site.standing(layout)
+        labels = site.labels(layout)
+        _, moved = earthworks(site.profile, built, site.soil)
+    except BadInput:
+        if len(layout) > 1:
+            return [found for one in layout for found in outlines(site, (one,))]
+        return [] if not layout else outlines(site, ())
+    found = []
+    for barrier, words in zip(built, labels, strict=True):
+        try:
+            own = (
+                moved[barrier] if isinstance(barrier, Earthwork) else barrier.outline(site.profile)
+            )
+        except BadInput:
+            continue
+        found.append((barrier, own, words))
+    return found
+
+
+def spanned(values: Sequence[float]) -> Range1d:
+    """Return a range that holds values, with a margin."""
+    low, high = min(values), max(values)
+    margin = MARGIN * (high - low or 1.0)
+    return Range1d(low - margin, high + margin)

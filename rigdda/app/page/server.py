@@ -1,0 +1,139 @@
+"""The server of the page: on this machine only, behind a random token in its address."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+import webbrowser
+from collections.abc import Callable
+from typing import Any
+
+import panel as pn
+from tornado.httputil import HTTPHeaders, HTTPServerRequest
+from tornado.web import OutputTransform, StaticFileHandler
+
+from rigdda import BadInput
+from rigdda.app.page import theme
+from rigdda.app.page.page import Page
+from rigdda.app.page.state import Project
+from rigdda.app.page.workspace import Workspace
+
+HOST = "127.0.0.1"
+"""The only address that the server listens at."""
+
+TOKEN = 24
+"""Bytes of the token."""
+
+HEADERS = {
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Content-Security-Policy": (
+        "default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval'; "
+        "connect-src 'self' ws://127.0.0.1:* ws://localhost:*; frame-ancestors 'none'"
+    ),
+}
+"""Headers of every answer: nothing is loaded from another machine, and no other page may frame
+this one. Bokeh compiles its templates at run time and needs 'unsafe-eval'."""
+
+
+REFUSED = b"this address is not that of the page\n"
+"""Answer to a request that names another host."""
+
+
+def free_port(port: int | None) -> int:
+    """Return a port that nobody listens at, or the port that is asked for.
+
+    Raises
+    ------
+    BadInput
+        If the port is taken.
+    """
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port or 0))
+        except OSError as error:
+            hint = f"name a port that is free and allowed ({error.strerror})"
+            raise BadInput("--port", port, hint) from None
+        return int(probe.getsockname()[1])
+
+
+def serve(project: Project, port: int | None, browser: bool, say: Callable[[str], None]) -> None:
+    """Serve the page of a project until the process is interrupted.
+
+    Parameters
+    ----------
+    project : Project
+        The project.
+    port : int, optional
+        The port; by default a free one.
+    browser : bool
+        Whether to open the page in the browser of the system.
+    say : callable
+        Function that prints a line, which tells the address.
+
+    Raises
+    ------
+    BadInput
+        If the port is taken.
+    """
+    at, token = free_port(port), secrets.token_urlsafe(TOKEN)
+    pn.extension(sizing_mode=None, notifications=False)
+    with Workspace(project) as workspace:
+        server: Any = pn.serve(
+            {"/": lambda: _session(workspace)},
+            address=HOST, port=at, prefix=f"/{token}", show=False, start=False, threaded=False,
+            websocket_origin=[f"{HOST}:{at}", f"localhost:{at}"], title="rigdda", verbose=False,
+            extra_patterns=[
+                ("/report/(.*)", StaticFileHandler, {"path": str(workspace.report_folder)})
+            ],
+            check_unused_sessions_milliseconds=5000, unused_session_lifetime_milliseconds=10000,
+        )  # fmt: skip
+        hosts = frozenset({f"{HOST}:{at}", f"localhost:{at}"})
+        server._tornado.add_transform(type("Guarded", (Guard,), {"hosts": hosts}))
+        address = f"http://{HOST}:{at}/{token}/"
+        say(address)
+        if browser:
+            webbrowser.open(address)
+        server.start()
+        try:
+            server.io_loop.start()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            server.stop()
+
+
+def _session(workspace: Workspace) -> Any:
+    """Return the page of one tab of the browser."""
+    colours = theme.DARK if pn.config.theme == "dark" else theme.LIGHT
+    pn.config.raw_css = [theme.css(colours)]
+    return Page(workspace, colours).panel
+
+
+class Guard(OutputTransform):
+    """Adds `HEADERS` to each answer, and refuses requests that name another host.
+
+    A page of another site whose name was pointed at this machine sends its own name as the host.
+    """
+
+    hosts: frozenset[str] = frozenset()
+
+    def __init__(self, request: HTTPServerRequest):
+        self.known = request.host in self.hosts
+
+    def transform_first_chunk(
+        self, status_code: int, headers: HTTPHeaders, chunk: bytes, finishing: bool
+    ) -> tuple[int, HTTPHeaders, bytes]:
+        """Return the status, the headers and the first part of an answer."""
+        for name, value in HEADERS.items():
+            headers[name] = value
+        if self.known:
+            return status_code, headers, chunk
+        headers["Content-Length"] = str(len(REFUSED))
+        return 403, headers, REFUSED
+
+    def transform_chunk(self, chunk: bytes, finishing: bool) -> bytes:
+        """Return a later part of an answer."""
+        return chunk if self.known else b""

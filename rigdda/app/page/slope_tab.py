@@ -1,0 +1,462 @@
+"""The tab Slope: the survey, the ground, the road, where rock starts, and the events."""
+
+from __future__ import annotations
+
+import html
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import panel as pn
+from bokeh.models import ColumnDataSource, HoverTool, PointDrawTool
+
+from rigdda import BadInput, Site
+from rigdda.app import new_site, site_check
+from rigdda.app.page import edits
+from rigdda.app.page.forms import Bound, button, choice, heading, number, text
+from rigdda.app.page.section import Section
+from rigdda.ground.grounds import GROUNDS
+from rigdda.model.survey import spikes
+
+if TYPE_CHECKING:
+    from rigdda.app.page.workspace import Host
+
+Path_ = tuple[str | int, ...]
+
+DIGITS = 2
+"""Decimals of chainages and elevations that are dragged [m]."""
+
+MOST = 40
+"""Points of the survey up to which each of them can be dragged."""
+
+WIDE = 400
+"""Width of the forms [pixels]."""
+
+
+class Handle:
+    """A place on the slope that is dragged along the ground."""
+
+    def __init__(self, words: str, x: float, path: Path_, item: int | None = None):
+        self.words, self.x, self.path, self.item = words, x, path, item
+
+
+def handles(site: Site) -> list[Handle]:
+    """Return what can be dragged on a site: ends of bands, zone, road and grounds, and the toe."""
+    found = []
+    for i, source in enumerate(site.sources):
+        if source.band is not None:
+            for k, end in enumerate(("upper", "lower")):
+                path: Path_ = ("sources", i, "band", k)
+                found.append(Handle(f"{end} end of {source.name}", source.band[k], path))
+    for table, words, place in (
+        ("road", "of the road", site.road),
+        ("barrier_zone", "of the barrier zone", site.barrier_zone),
+    ):
+        found.append(Handle(f"uphill edge {words}", place.start, (table, "start")))
+        found.append(Handle(f"downhill edge {words}", place.end, (table, "end")))
+    found.append(Handle("toe of the slope", site.slope.toe, ("slope", "toe")))
+    for i, stretch in enumerate(site.slope.surfaces):
+        for end in ("start", "end"):
+            path = ("slope", "surfaces", i, end)
+            found.append(Handle(f"{end} of {stretch.surface}", getattr(stretch, end), path))
+    return found
+
+
+class SlopeTab:
+    """The tab Slope."""
+
+    title = "Slope"
+
+    def __init__(self, page: Host):
+        self.page, self.project, self.theme = page, page.project, page.theme
+        self.section = Section(self.theme, "Section of the slope", coordinates=True)
+        self._showing = False
+        self._handles: list[Handle] = []
+        self._bound: list[Bound | Words] = []
+        self._structure: Any = None
+        self._places = ColumnDataSource({"x": [], "y": [], "words": []})
+        self._points = ColumnDataSource({"x": [], "y": []})
+        self._draw_handles()
+        self._findings = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
+        self._forms = pn.Column(width=WIDE, scroll=True, height=610)
+        self._import = self._importer()
+        self.panel = pn.Row(
+            pn.Column(self.section.plot, self._findings, sizing_mode="stretch_width"),
+            self._forms,
+            sizing_mode="stretch_width",
+        )
+
+    def show(self) -> None:
+        """Show the site as it is now."""
+        if not self.project.has_site:
+            self._forms[:] = [self._import]
+            words = "There is no site yet: import a survey."
+            self._findings.object = f"<p>{words}</p>"
+            return
+        site = self.project.site
+        self.section.show(site)
+        self._showing = True
+        self._handles = handles(site)
+        ground = site.profile
+        self._places.data = {
+            "x": [one.x for one in self._handles],
+            "y": [ground.height(one.x) for one in self._handles],
+            "words": [one.words for one in self._handles],
+        }
+        near = site.slope.points if len(site.slope.points) <= MOST else ()
+        self._points.data = {"x": [p[0] for p in near], "y": [p[1] for p in near]}
+        self._showing = False
+        self._findings.object = self._found(site)
+        structure = _structure(site)
+        if structure != self._structure:
+            self._structure = structure
+            self._build(site)
+        for one in self._bound:
+            one.refresh()
+
+    def tick(self) -> None:
+        """Nothing is computed for this tab in the background."""
+
+    def _draw_handles(self) -> None:
+        plot, theme = self.section.plot, self.theme
+        places = plot.scatter(
+            "x", "y", source=self._places, marker="circle", size=13, line_width=2,
+            fill_color=theme.paper, line_color=theme.accent,
+        )  # fmt: skip
+        points = plot.scatter(
+            "x", "y", source=self._points, marker="square", size=7, line_width=1,
+            fill_color=theme.paper, line_color=theme.text, legend_label="points of the survey",
+        )  # fmt: skip
+        drag = PointDrawTool(renderers=[places, points], add=False, description="drag the handles")
+        plot.add_tools(drag)
+        plot.toolbar.active_drag = drag
+        plot.add_tools(
+            HoverTool(
+                renderers=[places], description="names of the handles",
+                tooltips=[("", "@words"), ("chainage", "@x{0.00} metres")],
+            )
+        )  # fmt: skip
+        self._places.on_change("data", self._dragged)
+        self._points.on_change("data", self._dragged_point)
+
+    def _dragged(self, _: str, __: Any, new: Any) -> None:
+        """Move what a handle stands for."""
+        if self._showing:
+            return
+        for one, x in zip(self._handles, new["x"], strict=False):
+            if abs(float(x) - one.x) > 10.0**-DIGITS / 2:
+                value = round(float(x), DIGITS)
+                self.page.act(
+                    partial(self.project.set_value, one.path, value, f"moved the {one.words}")
+                )
+                return
+        self.show()
+
+    def _dragged_point(self, _: str, __: Any, new: Any) -> None:
+        """Move a point of the survey."""
+        if self._showing:
+            return
+        points = self.project.site.slope.points
+        for k, (x, y) in enumerate(zip(new["x"], new["y"], strict=False)):
+            place = [round(float(x), DIGITS), round(float(y), DIGITS)]
+            if max(abs(place[0] - points[k][0]), abs(place[1] - points[k][1])) > 10.0**-DIGITS:
+                self.page.act(
+                    partial(self.project.set_value, ("slope", "points", k), place, "moved a point")
+                )
+                return
+        self.show()
+
+    def _found(self, site: Site) -> str:
+        """Return what `rigdda check` finds without releases, as a list."""
+        written = site_check.written_events(str(self.project.where.site))
+        odd = site_check.oddities(site, (), written)
+        count = site_check.placeholders(str(self.project.where.site))
+        head = "Nothing looks odd." if not odd else f"{len(odd)} to look at:"
+        lines = "".join(f"<li>{html.escape(line)}</li>" for line in odd)
+        rest = f"<p>The site file marks {count} values as placeholders to replace.</p>"
+        command = f"rigdda check {self.project.where.site}"
+        return (
+            f"<h2 style='font-size:15px;margin:8px 0 2px'>{head}</h2>"
+            f"<ul style='margin:2px 0;padding-left:20px'>{lines}</ul>{rest if count else ''}"
+            f"<p style='color:{self.theme.quiet}'>The same, with a few releases: "
+            f"<code>{html.escape(command)}</code></p>"
+        )
+
+    def _set(self, path: Path_, words: str) -> Callable[[Any], None]:
+        """Return a function that writes a value of the site file."""
+
+        def write(value: Any) -> None:
+            self.page.act(partial(self.project.set_value, path, value, f"set {words}"))
+
+        return write
+
+    def _number(self, label: str, path: Path_, **more: Any) -> Any:
+        found = number(label, partial(_value, self.project, path), self._set(path, label), **more)
+        self._bound.append(found)
+        return found.widget
+
+    def _build(self, site: Site) -> None:
+        """Build the forms anew, for a site with other tables than before."""
+        self._bound = []
+        self._forms[:] = [
+            *self._outliers(site),
+            *self._rock(site),
+            *self._places_of_road(),
+            *self._grounds(site),
+            *self._events(site),
+            pn.Card(self._import, title="Import a survey", collapsed=True, width=WIDE - 30),
+        ]
+
+    def _outliers(self, site: Site) -> list[Any]:
+        """Return how the outliers of the survey are mended."""
+        found = spikes(np.array(site.slope.points, dtype=np.float64))
+        out: list[Any] = [heading("Doubtful points of the survey")] if found else []
+        for k, height in found:
+            x, y = site.slope.points[k]
+            words = (
+                f"Point {k + 1} at chainage {x:g}, elevation {y:g} metres, is {abs(height):.1f} "
+                f"metres {'above' if height > 0 else 'below'} both neighbours."
+            )
+            out += [
+                text(words),
+                pn.Row(
+                    button("Put it on the line", partial(self._put_on_line, k)),
+                    button("Remove the point", partial(self._remove_point, k)),
+                ),
+            ]
+        return out
+
+    def _put_on_line(self, k: int) -> None:
+        (x0, y0), (x, _), (x1, y1) = self.project.site.slope.points[k - 1 : k + 2]
+        share = (x - x0) / (x1 - x0) if x1 != x0 else 0.5
+        place = [x, round(y0 + share * (y1 - y0), 3)]
+        self.page.act(
+            lambda: self.project.set_value(("slope", "points", k), place, f"mended point {k + 1}")
+        )
+
+    def _remove_point(self, k: int) -> None:
+        self.page.act(
+            lambda: self.project.change_site(
+                lambda old: edits.without(old, ("slope", "points", k)), f"removed point {k + 1}"
+            )
+        )
+
+    def _rock(self, site: Site) -> list[Any]:
+        out: list[Any] = [heading("Where rock starts")]
+        for i, source in enumerate(site.sources):
+            if source.band is None:
+                words = "a mass cut by joints, or surveyed blocks; edit it in the site file"
+                out.append(text(f"{source.name}: {words}"))
+                continue
+            out += [
+                text(source.name),
+                pn.Row(
+                    self._number("Upper end [metres]", ("sources", i, "band", 0)),
+                    self._number("Lower end [metres]", ("sources", i, "band", 1)),
+                ),
+            ]
+        return out
+
+    def _places_of_road(self) -> list[Any]:
+        return [
+            heading("Road and barrier zone"),
+            pn.Row(
+                self._number("Road, uphill edge [metres]", ("road", "start")),
+                self._number("Road, downhill edge [metres]", ("road", "end")),
+            ),
+            pn.Row(
+                self._number("Zone, uphill end [metres]", ("barrier_zone", "start")),
+                self._number("Zone, downhill end [metres]", ("barrier_zone", "end")),
+            ),
+        ]
+
+    def _grounds(self, site: Site) -> list[Any]:
+        """Return the choice of the ground of each surface, and what it is."""
+        out: list[Any] = [heading("Grounds")]
+        options = {f"{name.replace('_', ' ')}": name for name in GROUNDS}
+        for name in dict.fromkeys(site.slope.chain()[1]):
+            path = ("surfaces", name, "ground")
+            known = (
+                options if site.surfaces[name].ground in GROUNDS else {"own values": None} | options
+            )
+            bound = choice(
+                f"Ground of {name}", known, partial(self._ground, name), self._set(path, name), 330
+            )
+            told = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
+            self._bound += [bound, Words(told, partial(self._ground_words, name))]
+            out += [bound.widget, told]
+        return out
+
+    def _ground(self, name: str) -> str | None:
+        found = self.project.site.surfaces[name].ground
+        return found if found in GROUNDS else None
+
+    def _ground_words(self, name: str) -> str:
+        ground = GROUNDS.get(self.project.site.surfaces[name].ground or "")
+        if ground is None:
+            return "<p style='margin:0'>Its values are given one by one in the site file.</p>"
+        spans = (
+            f"friction {ground.friction_deg.low:g} to {ground.friction_deg.high:g} degrees, "
+            f"restitution {ground.restitution.low:g} to {ground.restitution.high:g}, "
+            f"rolling resistance {ground.rolling.low:g} to {ground.rolling.high:g}"
+        )
+        quiet = f"margin:0;color:{self.theme.quiet}"
+        return f"<p style='{quiet}'>{html.escape(ground.words)}: {spans}</p>"
+
+    def _events(self, site: Site) -> list[Any]:
+        out: list[Any] = [heading("Events")]
+        bands = {s.name for s in site.sources if s.band is not None}
+        for i, event in enumerate(site.events):
+            out.append(text(f"{event.name}, from {event.source}"))
+            period = number(
+                "Return period on 100 metres [years]",
+                partial(_period, self.project, i), partial(self._set_period, i), 1.0, 230,
+                start=1e-3,
+            )  # fmt: skip
+            design = Bound(
+                pn.widgets.Checkbox(name="Design event", margin=(18, 8)),
+                partial(_design, self.project, i),
+                self._set(("events", i, "design"), "design event"),
+            )
+            self._bound += [period, design]
+            out.append(pn.Row(period.widget, design.widget))
+            if event.source in bands and event.area is not None:
+                out += self._sizes(i)
+        return out
+
+    def _sizes(self, i: int) -> list[Any]:
+        """Return the inputs for the volumes of the blocks of an event, and their shapes."""
+        volumes = [
+            number(
+                f"{words} volume [cubic metres]", partial(_volume, self.project, i, k),
+                partial(self._set_volume, i, k), 0.1, 170, start=1e-4,
+            )
+            for k, words in enumerate(("Least", "Greatest"))
+        ]  # fmt: skip
+        self._bound += volumes
+        place = next(
+            k for k, s in enumerate(self.project.site.sources)
+            if s.name == self.project.site.events[i].source
+        )  # fmt: skip
+        shape = [
+            self._number("Exponent of volumes [-]", ("events", i, "exponent"), step=0.1, width=150),
+            self._number("Longest over broadest [-]", ("sources", place, "aspect", 1), step=0.1,
+                         width=170),
+        ]  # fmt: skip
+        return [pn.Row(*(one.widget for one in volumes)), pn.Row(*shape)]
+
+    def _set_period(self, i: int, years: float) -> None:
+        values: dict[Path_, Any] = {
+            ("events", i, "rate"): None,
+            ("events", i, "section_length"): None,
+            ("events", i, "return_period"): years,
+        }
+        self._change(values, "set the return period")
+
+    def _set_volume(self, i: int, k: int, volume: float) -> None:
+        both = [_volume(self.project, i, j) for j in (0, 1)]
+        both[k] = volume
+        values: dict[Path_, Any] = {("events", i, "area"): None, ("events", i, "volume"): both}
+        self._change(values, "set the volume of blocks")
+
+    def _change(self, values: dict[Path_, Any], words: str) -> None:
+        def change(old: str) -> str:
+            return edits.with_values(old, values)
+
+        self.page.act(lambda: self.project.change_site(change, words))
+
+    def _importer(self) -> Any:
+        """Return the form that makes a site of a survey."""
+        name = pn.widgets.TextInput(name="Name of the site", value="section", width=340)
+        file = pn.widgets.FileInput(
+            name="Survey", accept=".csv,.txt,.tsv,.xyz,.dat,.dxf", width=340
+        )
+        layer = pn.widgets.TextInput(name="Layer of a drawing, if it has several", width=340)
+        road = [
+            pn.widgets.FloatInput(name=f"Road, {w} edge [metres]", value=None, width=160)
+            for w in ("one", "other")
+        ]
+
+        def make() -> None:
+            self.page.act(
+                lambda: self._import_survey(
+                    name.value, file, layer.value or None, [r.value for r in road]
+                )
+            )
+
+        return pn.Column(
+            text("A table (CSV) with chainage and elevation in metres, or a drawing (DXF) with a "
+                 "polyline. What is left empty becomes a placeholder to replace."),
+            name, text("Survey (CSV or DXF)"), file, layer, pn.Row(*road),
+            button("Make the site", make, primary=True),
+            width=WIDE - 40,
+        )  # fmt: skip
+
+    def _import_survey(self, name: str, file: Any, layer: str | None, road: list[Any]) -> None:
+        """Make a site of the survey that was chosen, in the place of the present one."""
+        if not file.value:
+            raise BadInput("survey", None, "choose a file first")
+        ends = (road[0], road[1]) if None not in road else None
+        with tempfile.TemporaryDirectory() as folder:
+            suffix = Path(file.filename or "").suffix.lower()
+            copy = Path(folder) / f"survey{suffix}"
+            copy.write_bytes(file.value)
+            request = new_site.SiteRequest(road=ends, layer=layer)
+            try:
+                made, found = new_site.compose(name, copy, request)
+            except BadInput as bad:
+                own = str(bad.field).replace(str(copy), file.filename)
+                raise BadInput(own, bad.value, bad.hint) from None
+        self.project.change_site(lambda _: made, f"imported {file.filename}")
+        self.page.say("; ".join(found.notes))
+
+
+class Words:
+    """A text that follows the project."""
+
+    def __init__(self, pane: Any, get: Callable[[], str]):
+        self.pane, self._get = pane, get
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show the text as it is now."""
+        self.pane.object = self._get()
+
+
+def _structure(site: Site) -> Any:
+    """Return what the forms of a site depend on, other than values."""
+    points = np.array(site.slope.points, dtype=np.float64)
+    return (
+        tuple((s.name, s.band is None) for s in site.sources),
+        tuple((e.name, e.source, e.area is None) for e in site.events),
+        tuple(dict.fromkeys(site.slope.chain()[1])),
+        tuple((k, round(h, 3)) for k, h in spikes(points)),
+    )
+
+
+def _value(project: Any, path: Path_) -> Any:
+    """Return the value of a site at the path of its file."""
+    found = project.site
+    for key in path:
+        found = (
+            found[key] if isinstance(key, int) or isinstance(found, dict) else getattr(found, key)
+        )
+    return found
+
+
+def _period(project: Any, i: int) -> float:
+    """Return the mean time between two events on 100 m [years]."""
+    rate = project.site.events[i].rate
+    return float(f"{1.0 / rate:.10g}") if rate > 0.0 else float("inf")
+
+
+def _design(project: Any, i: int) -> bool:
+    return bool(project.site.events[i].design)
+
+
+def _volume(project: Any, i: int, k: int) -> float:
+    """Return the least or the greatest volume of the blocks of an event [m3]."""
+    return float(f"{project.site.events[i].area[k] ** 1.5:.6g}")

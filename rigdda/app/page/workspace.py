@@ -1,0 +1,113 @@
+"""What all tabs of the page share: the project, the computing, and what a tab may ask for."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import tomli_w
+
+from rigdda.app.page.jobs import Job
+from rigdda.app.page.live import Live, study_table
+from rigdda.app.page.state import LAYOUT, Project
+from rigdda.app.page.theme import Theme
+from rigdda.files import atomic
+
+STUDY = "study.toml"
+"""File of the study that computes the figures of the page."""
+
+
+class Workspace:
+    """What all tabs of the browser share: the project and the computing.
+
+    Parameters
+    ----------
+    project : Project
+        The project.
+    """
+
+    def __init__(self, project: Project):
+        self.project = project
+        self.live = Live()
+        self.search = Job(project.folder, "search")
+        self.study = Job(project.folder, "study")
+        self.report = Job(project.folder, "report")
+        self._study = ""
+
+    @property
+    def study_file(self) -> Path:
+        """The study file of the figures of the layout."""
+        return self.project.folder / STUDY
+
+    @property
+    def study_arguments(self) -> list[str]:
+        """Arguments of the command that computes the figures of the layout."""
+        out = self.project.folder / "study"
+        return ["study", str(self.study_file), "--seed", "0", "--out", str(out)]
+
+    @property
+    def study_command(self) -> str:
+        """The command that computes the figures of the layout."""
+        return shlex.join(["rigdda", *self.study_arguments])
+
+    @property
+    def report_folder(self) -> Path:
+        """The folder of the report."""
+        return self.project.folder / "report"
+
+    @property
+    def design_folder(self) -> Path | None:
+        """The results folder of the last search; None before the first."""
+        known = self.search.arguments
+        return Path(known[known.index("--out") + 1]) if "--out" in known else None
+
+    def write_study(self) -> None:
+        """Write the study file of the figures that are known, if it has changed."""
+        found, project = self.live.figures, self.project
+        if found is None or not found.releases or found.layout != project.layout:
+            return
+        site = os.path.relpath(project.where.site, project.folder)
+        table = study_table(site, found.layout, LAYOUT, found.releases)
+        text = tomli_w.dumps(table)
+        if text != self._study:
+            with atomic(self.study_file) as part:
+                part.write_text(text, encoding="utf-8")
+            self._study = text
+
+    def __enter__(self) -> Workspace:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.live.close()
+        for job in (self.search, self.study, self.report):
+            job.close()
+
+
+class Host(Protocol):
+    """The page as its tabs see it."""
+
+    workspace: Workspace
+    project: Project
+    theme: Theme
+
+    def act(self, do: Callable[[], object]) -> bool:
+        """Do something to the project, and show its error or what has changed."""
+
+    def say(self, words: str) -> None:
+        """Show a message in the head of the page."""
+
+
+class Tab(Protocol):
+    """A tab of the page."""
+
+    title: str
+    panel: Any
+
+    def show(self) -> None:
+        """Show the site and the layout as they are now."""
+
+    def tick(self) -> None:
+        """Show what has been computed meanwhile."""

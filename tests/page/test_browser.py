@@ -1,0 +1,236 @@
+"""The page in a real browser: from a survey to a dragged fence, and back by the command line."""
+
+import csv
+import os
+import shlex
+import time
+import tomllib
+
+import pytest
+from light_site import LIGHT
+
+from rigdda import Fence, Site, load_layout, save_layout
+from rigdda.app.cli import main
+
+PLACE = """
+([title, x, y]) => {
+  for (const document of Bokeh.documents)
+    for (const model of document._all_models.values())
+      if (model.type === "Figure" && model.title?.text === title) {
+        const view = Bokeh.index.find_one(model)
+        if (view == null) continue
+        const box = view.el.getBoundingClientRect()
+        return [box.left + view.frame.x_scale.compute(x), box.top + view.frame.y_scale.compute(y)]
+      }
+  return null
+}
+"""
+"""Where a point of a figure is in the window [pixels]."""
+
+SURVEY = """chainage,elevation
+0,45
+6,44.5
+9,35
+16,20.5
+18.5,19.4
+20.5,26.8
+23,10
+25.5,9
+29.8,0
+34.8,-0.5
+44.8,-0.5
+62,-0.8
+85,-2
+"""
+"""A profile whose sixth point is a typing error."""
+
+
+HANDLE = """
+words => {
+  for (const document of Bokeh.documents)
+    for (const model of document._all_models.values())
+      if (model.type === "ColumnDataSource") {
+        const column = name => model.data instanceof Map ? model.data.get(name) : model.data[name]
+        const k = Array.from(column("words") ?? []).indexOf(words)
+        if (k >= 0) return [column("x")[k], column("y")[k]]
+      }
+  return null
+}
+"""
+"""Where the handle of a name is in its figure [m]."""
+
+
+def _drag(tab, title, words, change, done):
+    """Drag a handle until something is done; a busy browser may miss the first attempt."""
+    for _ in range(5):
+        x, y = tab.wait_for_function(HANDLE, arg=words, timeout=30_000).json_value()
+        a = tab.wait_for_function(PLACE, arg=[title, x, y]).json_value()
+        b = tab.evaluate(PLACE, [title, x + change[0], y + change[1]])
+        tab.mouse.move(*a)
+        tab.wait_for_timeout(100)
+        tab.mouse.down()
+        tab.mouse.move((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, steps=4)
+        tab.mouse.move(*b, steps=4)
+        tab.mouse.up()
+        for _ in range(60):
+            if done():
+                return
+            tab.wait_for_timeout(50)
+    raise AssertionError(f"{words} was not dragged")
+
+
+def _open(tab, name):
+    tab.locator(".bk-tab", has_text=name).click()
+
+
+def _wait(done, seconds=90.0):
+    latest = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < latest
+        time.sleep(0.05)
+
+
+def _figures(tab):
+    """Return the figures of the layout with all digits, by name."""
+    found = tab.locator("data.exact").evaluate_all(
+        "all => all.map(one => [one.title, one.getAttribute('value')])"
+    )
+    return dict(found)
+
+
+def _layout(folder):
+    file = folder / "layout.toml"
+    return load_layout(file) if file.is_file() else ()
+
+
+@pytest.fixture
+def project(tmp_path):
+    folder = tmp_path / "project"
+    folder.mkdir()
+    return folder
+
+
+@pytest.mark.slow
+def test_a_fence_is_dragged_and_its_figures_are_those_of_the_command(serve, tab, project, capsys):
+    LIGHT.save(project / "site.toml")
+    tab.goto(serve(project).address)
+    _open(tab, "Barriers")
+    tab.get_by_role("button", name="Add fence").click()
+    _wait(lambda: len(_layout(project)) == 1)
+    fence = _layout(project)[0]
+    title = "Section with barriers"
+    _drag(tab, title, "place of the fence 1", (-3.6, 5.0), lambda: _layout(project)[0] != fence)
+    moved = _layout(project)[0]
+    assert moved.x == pytest.approx(fence.x - 3.6, abs=0.3)
+    _drag(tab, title, "height of the fence 1", (0.0, 4.0), lambda: _layout(project)[0] != moved)
+    assert _layout(project)[0].height > moved.height
+    tab.locator("data.exact").first.wait_for(state="attached")
+    command = tab.locator("code.command").inner_text()
+    releases = 0
+    while not releases:
+        shown = _figures(tab)
+        table = tomllib.loads((project / "study.toml").read_text())
+        if shown == _figures(tab) and shown.get("block-releases") == str(table["releases"]):
+            releases = table["releases"]
+            (project / "kept.toml").write_text((project / "study.toml").read_text())
+    words = shlex.split(command.replace("study.toml", "kept.toml"))
+    assert main(words[1:]) == 0
+    with (project / "study" / "layouts.csv").open(newline="") as file:
+        row = next(r for r in csv.DictReader(file) if r["layout"] == "layout")
+    for name, value in row.items():
+        if name != "layout":
+            assert shown[f"layout-{name}"] == value, name
+    tab.get_by_role("button", name="Undo").click()
+    _wait(lambda: _layout(project)[0].height == moved.height)
+
+
+def test_a_forbidden_layout_tells_why_and_markup_is_text(serve, tab, project):
+    mark = "<img src=x onerror=document.title='bad'>"
+    text = Site.load("quick")
+    text.save(project / "site.toml")
+    data = (project / "site.toml").read_text().replace('"quick"', f'"{mark}"', 1)
+    data = data.replace('name = "block"', f'name = "{mark}"').replace(
+        "block = 0.2", f'"{mark}" = 0.2'
+    )
+    (project / "site.toml").write_text(data)
+    assert Site.load(project / "site.toml").name == mark
+    save_layout((Fence(31.0, 3.0, energy_class=1000),), project / "layout.toml")
+    (project / "layouts").mkdir()
+    save_layout((), project / "layouts" / "<b>x<b>.toml")
+    tab.goto(serve(project).address)
+    tab.get_by_role("heading", name=mark).wait_for()
+    for name in ("Slope", "Falls", "Barriers", "Decide", "Report"):
+        _open(tab, name)
+        tab.wait_for_timeout(400)
+    _open(tab, "Barriers")
+    tab.get_by_text("the road begins at 34.8").wait_for()
+    assert tab.locator("img[src=x]").count() == 0
+    assert tab.title() != "bad"
+
+
+@pytest.mark.slow
+def test_from_a_survey_to_a_search_that_survives_its_server(serve, chromium, tab, project):
+    survey = project.parent / "section.csv"
+    survey.write_text(SURVEY)
+    server = serve(project)
+    tab.goto(server.address)
+    tab.get_by_text("import a survey").first.wait_for()
+    tab.locator("input[type=file]").set_input_files(survey)
+    tab.wait_for_timeout(500)
+    tab.get_by_role("button", name="Make the site").click()
+    tab.get_by_role("button", name="Put it on the line").click()
+    _wait(lambda: Site.load(project / "site.toml").slope.points[5][1] == pytest.approx(15.222))
+    site = Site.load(project / "site.toml")
+    end = site.sources[0].band[1]
+
+    def band():
+        return Site.load(project / "site.toml").sources[0].band
+
+    _drag(tab, "Section of the slope", f"lower end of {site.sources[0].name}", (-2.0, 2.0),
+          lambda: band()[1] != end)  # fmt: skip
+    assert band()[1] < end
+    _open(tab, "Falls")
+    tab.get_by_text("Nothing is released yet.").wait_for()  # a click before is ignored
+    tab.get_by_role("button", name="Release 200").click()
+    tab.get_by_text("200 of 200 releases").wait_for()
+    other = chromium.new_page(viewport={"width": 1280, "height": 720})
+    other.goto(server.address)
+    _open(other, "Barriers")
+    _open(tab, "Barriers")
+    tab.get_by_role("button", name="Add ditch").click()
+    other.get_by_text("1. ditch").wait_for(timeout=20_000)  # the tabs show the same project
+    other.close()
+    _open(tab, "Decide")
+    tab.get_by_role("button", name="Start the search").click()
+    (job,) = [project / "search.job.json"]
+    _wait(job.exists)
+    _wait(lambda: any(project.glob("design-*/evaluations.csv")), 240.0)
+    before = load_layout(project / "layout.toml"), Site.load(project / "site.toml")
+    server.kill()
+    server.start()
+    tab.goto(server.address)
+    _open(tab, "Decide")
+    tab.get_by_text("The search is interrupted").wait_for()
+    assert (load_layout(project / "layout.toml"), Site.load(project / "site.toml")) == before
+    tab.get_by_role("button", name="Resume").click()
+    tab.get_by_text("The search is running").wait_for()
+    children = _children(server.process.pid)
+    assert len(children) == 1
+    tab.get_by_role("button", name="Cancel").click()
+    tab.get_by_text("The search is cancelled").wait_for()
+    assert _children(server.process.pid) == []
+
+
+def _children(pid):
+    """Return the processes that a process has started and that still run."""
+    found = []
+    for name in os.listdir("/proc"):
+        if name.isdigit():
+            try:
+                with open(f"/proc/{name}/stat") as file:
+                    state, parent = file.read().rpartition(")")[2].split()[:2]
+            except OSError:
+                continue
+            if int(parent) == pid and state != "Z":
+                found.append(int(name))
+    return found

@@ -1,0 +1,90 @@
+"""Live figures are those of `rigdda study`; releases are computed in the background."""
+
+import csv
+import time
+
+import msgspec
+import pytest
+import tomli_w
+from light_site import LIGHT
+
+from rigdda import Fence, save_layout
+from rigdda.app.cli import main
+from rigdda.app.page.falls import ENDS, Release, shares
+from rigdda.app.page.live import CURRENT, Live, study_table
+
+LAYOUT = (Fence(30.0, 4.0, energy_class=1000),)
+
+
+def _wait(live: Live, done) -> None:
+    latest = time.monotonic() + 200.0
+    while live.figures is None or not done(live.figures):
+        assert time.monotonic() < latest, live.figures
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def live():
+    made = Live(most=50)
+    yield made
+    made.close()
+
+
+def test_figures_are_those_of_the_command_to_the_digit(live, tmp_path, capsys):
+    live.ask(LIGHT, LAYOUT)
+    _wait(live, lambda found: found.releases == 50 and not found.doing)
+    found = live.figures
+    assert found.checks is not None
+    LIGHT.save(tmp_path / "site.toml")
+    save_layout(LAYOUT, tmp_path / "layout.toml")
+    table = study_table("site.toml", LAYOUT, "layout.toml", 50)
+    (tmp_path / "study.toml").write_text(tomli_w.dumps(table))
+    out = tmp_path / "out"
+    assert main(["study", str(tmp_path / "study.toml"), "--seed", "0", "--out", str(out)]) == 0
+    for name, own in (("layouts", [found.costs]), ("events", found.events)):
+        with (out / f"{name}.csv").open(newline="") as file:
+            rows = [row for row in csv.DictReader(file) if row["layout"] == CURRENT]
+        assert rows == [{k: "" if v != v else str(v) for k, v in row.items()} for row in own]
+
+
+def test_another_price_needs_no_new_release(live, monkeypatch):
+    live.ask(LIGHT, LAYOUT)
+    _wait(live, lambda found: found.releases == 50 and not found.doing)
+    before = live.figures
+    monkeypatch.setattr("rigdda.release_many", lambda jobs: pytest.fail("it simulates"))
+    dear = msgspec.structs.replace(LIGHT.consequences, closure=2.0 * LIGHT.consequences.closure)
+    live.ask(msgspec.structs.replace(LIGHT, consequences=dear), LAYOUT)
+    _wait(live, lambda found: found.costs is not None and found.costs != before.costs)
+    assert live.figures.costs["harm"] > before.costs["harm"]
+    assert live.figures.costs["cost"] == before.costs["cost"]
+
+
+def test_a_layout_that_cannot_stand_tells_why(live):
+    live.ask(LIGHT, (Fence(500.0, 3.0, energy_class=1000),))
+    _wait(live, lambda found: bool(found.fault))
+    assert "500" in live.figures.fault
+    assert live.figures.broken
+
+
+def test_releases_appear_as_they_are_computed_and_can_be_stopped():
+    release = Release(LIGHT, (), "block")
+    release.more(20)
+    release.join()
+    assert release.done == len(release.falls) == 20
+    assert {fall.end for fall in release.falls} <= set(ENDS.values())
+    assert sum(share.probability for share in shares(release.falls).values()) == pytest.approx(1)
+    fall = release.falls[0]
+    start = fall.outline(0.0)
+    assert start == pytest.approx(fall.found.vertices[0])
+    release.more(100_000)
+    release.stop()
+    release.join()
+    assert release.done < 100_020
+    assert release.asked == release.done
+
+
+def test_an_error_of_a_release_is_told():
+    release = Release(LIGHT, (Fence(500.0, 3.0, energy_class=1000),), "block")
+    release.more(5)
+    release.join()
+    assert "500" in release.fault

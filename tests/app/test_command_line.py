@@ -300,7 +300,7 @@ def test_a_quick_look_with_points(tmp_path: Path) -> None:
 def test_every_command_explains_itself(command: str, tmp_path: Path) -> None:
     words = run(command, "--help", folder=tmp_path)
     assert words.startswith(f"Usage: rigdda {command}")
-    if command not in ("sites", "new", "repeat"):
+    if command not in ("sites", "new", "repeat", "open"):
         assert ("--seed" in words or command in ("reprice", "report")) and "--out" in words
     assert list(tmp_path.iterdir()) == []
 
@@ -461,7 +461,10 @@ def test_a_terminal_sees_progress(toml: Path, tmp_path: Path) -> None:
             "--precision = '2': give a number of at least 0.0 and at most 0.5",
         ),
         (("design", "quick", "--seed", "-1"), "--seed = '-1': give a whole number of at least 0"),
-        (("train", "--model", "value", "--episodes", "3"), "--episodes is for --model policy"),
+        (
+            ("train", "--model", "value", "--simulate", "3"),
+            "--algorithm and --simulate are for --model policy",
+        ),
     ],
 )
 def test_an_option_outside_its_range_says_which_numbers_are_accepted(

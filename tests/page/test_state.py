@@ -70,7 +70,7 @@ def test_any_edits_leave_a_valid_project_on_disk_or_raise_a_clear_error(steps, t
         try:
             _apply(project, kind, given_)
         except BadInput as bad:
-            assert bad.mend
+            assert bad.hint
             assert project.current == before
         assert Site.load(project.where.site) == project.site
         file = project.folder / "layout.toml"

@@ -3,6 +3,7 @@
 import csv
 import os
 import shlex
+import shutil
 import time
 import tomllib
 
@@ -103,6 +104,19 @@ def _layout(folder):
     return load_layout(file) if file.is_file() else ()
 
 
+def _settled_figures(tab, project):
+    """Return the figures that the page shows, once they are those of its study of the layout."""
+    tab.wait_for_timeout(1000)  # those of the layout before have disappeared
+    for _ in range(120):
+        text, figures = (project / "study.toml").read_text(), _figures(tab)
+        tab.wait_for_timeout(500)
+        table = tomllib.loads(text)
+        unchanged = (project / "study.toml").read_text() == text and _figures(tab) == figures
+        if unchanged and figures.get("block-releases") == str(table["releases"]):
+            return figures
+    raise AssertionError("the figures never settle")
+
+
 @pytest.fixture
 def project(tmp_path):
     folder = tmp_path / "project"
@@ -126,13 +140,8 @@ def test_a_fence_is_dragged_and_its_figures_are_those_of_the_command(serve, tab,
     assert _layout(project)[0].height > moved.height
     tab.locator("data.exact").first.wait_for(state="attached")
     command = tab.locator("code.command").inner_text()
-    releases = 0
-    while not releases:
-        shown = _figures(tab)
-        table = tomllib.loads((project / "study.toml").read_text())
-        if shown == _figures(tab) and shown.get("block-releases") == str(table["releases"]):
-            releases = table["releases"]
-            (project / "kept.toml").write_text((project / "study.toml").read_text())
+    shown = _settled_figures(tab, project)
+    shutil.copyfile(project / "study.toml", project / "kept.toml")
     words = shlex.split(command.replace("study.toml", "kept.toml"))
     assert main(words[1:]) == 0
     with (project / "study" / "layouts.csv").open(newline="") as file:

@@ -206,8 +206,8 @@ def test_from_a_survey_to_a_search_that_survives_its_server(serve, chromium, tab
     other.goto(server.address)
     _open(other, "Barriers")
     _open(tab, "Barriers")
-    tab.get_by_role("button", name="Add ditch").click()
-    other.get_by_text("1. ditch").wait_for(timeout=20_000)  # the tabs show the same project
+    tab.get_by_role("button", name="Add fence").click()
+    other.get_by_text("1. fence").wait_for(timeout=20_000)  # the tabs show the same project
     other.close()
     _open(tab, "Decide")
     tab.get_by_role("button", name="Start the search").click()

@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import panel as pn
-from bokeh.models import ColumnDataSource, HoverTool, PointDrawTool
+from bokeh.models import HoverTool, PointDrawTool
 
 from rigdda import Layout
 from rigdda.app.page import placing
@@ -17,7 +17,7 @@ from rigdda.app.page.falls import Fall, Release
 from rigdda.app.page.forms import Bound, button, heading, in_words, number, paragraph, table
 from rigdda.app.page.live import LiveFigures
 from rigdda.app.page.placing import Grip
-from rigdda.app.page.section import Section
+from rigdda.app.page.section import HandleSource, Section
 from rigdda.app.page.theme import SERIES
 from rigdda.barriers.fence import FENCE_CLASSES
 
@@ -46,9 +46,8 @@ class BarriersTab:
         self.page, self.project, self.theme = page, page.project, page.theme
         self.live = page.workspace.live
         self.section = Section(self.theme, "Section with barriers")
-        self._showing = False
         self._grips: list[Grip] = []
-        self._handles = ColumnDataSource({"x": [], "y": [], "words": []})
+        self._handles = HandleSource(self._dragged)
         self._draw_handles()
         self._release: Release | None = None
         self._drawn = 0
@@ -113,7 +112,7 @@ class BarriersTab:
     def _draw_handles(self) -> None:
         plot = self.section.plot
         found = plot.scatter(
-            "x", "y", source=self._handles, marker="circle", size=14, line_width=2,
+            "x", "y", source=self._handles.source, marker="circle", size=14, line_width=2,
             fill_color=self.theme.paper, line_color=self.theme.accent,
         )  # fmt: skip
         drag = PointDrawTool(renderers=[found], add=False, description="drag the barriers")
@@ -122,22 +121,19 @@ class BarriersTab:
             HoverTool(renderers=[found], tooltips=[("", "@words")], description="names of handles"),
         )
         plot.toolbar.active_drag = drag
-        self._handles.on_change("data", self._dragged)
 
     def _show_grips(self) -> None:
-        self._showing = True
         self._grips = placing.grips(self.project.site, self.project.layout)
-        self._handles.data = {
-            "x": [grip.x for grip in self._grips],
-            "y": [grip.y for grip in self._grips],
-            "words": [grip.words for grip in self._grips],
-        }
-        self._showing = False
+        self._handles.show(
+            {
+                "x": [grip.x for grip in self._grips],
+                "y": [grip.y for grip in self._grips],
+                "words": [grip.words for grip in self._grips],
+            }
+        )
 
-    def _dragged(self, _: str, __: Any, new: Any) -> None:
+    def _dragged(self, new: Any) -> None:
         """Change the barrier whose handle was dragged."""
-        if self._showing:
-            return
         for grip, x, y in zip(self._grips, new["x"], new["y"], strict=False):
             if max(abs(float(x) - grip.x), abs(float(y) - grip.y)) > 1e-9:
                 make = partial(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
 from itertools import groupby, pairwise
 from typing import Any
 
@@ -205,3 +206,38 @@ def spanned(values: Sequence[float]) -> Range1d:
     low, high = min(values), max(values)
     margin = MARGIN * (high - low or 1.0)
     return Range1d(low - margin, high + margin)
+
+
+GIVEN = 4
+"""Number of positions that the browser may still return although it was given others."""
+
+
+class HandleSource:
+    """Positions of handles that a user drags, shown as glyphs of a plot.
+
+    The browser returns the positions of all handles after a drag. If it has not yet drawn what it
+    was given last, it returns what it was given before; this is told apart from a drag.
+
+    Attributes
+    ----------
+    source : ColumnDataSource
+        The positions, with the columns x and y, and perhaps words.
+    """
+
+    def __init__(self, dragged: Callable[[Any], None]):
+        self.source = ColumnDataSource({"x": [], "y": []})
+        self._dragged = dragged
+        self._given: deque[tuple[list[float], list[float]]] = deque(maxlen=GIVEN)
+        self._showing = False
+        self.source.on_change("data", self._changed)
+
+    def show(self, data: dict[str, list[Any]]) -> None:
+        """Show handles at other positions."""
+        self._given.append((list(data["x"]), list(data["y"])))
+        self._showing = True
+        self.source.data = data
+        self._showing = False
+
+    def _changed(self, _: str, __: Any, new: Any) -> None:
+        if not self._showing and (list(new["x"]), list(new["y"])) not in self._given:
+            self._dragged(new)

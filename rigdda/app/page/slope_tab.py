@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import panel as pn
-from bokeh.models import ColumnDataSource, HoverTool, PointDrawTool
+from bokeh.models import HoverTool, PointDrawTool
 
 from rigdda import BadInput, Site
 from rigdda.app import new_site, site_check
 from rigdda.app.page import edits
 from rigdda.app.page.forms import Bound, button, choice, heading, number, text
-from rigdda.app.page.section import Section
+from rigdda.app.page.section import HandleSource, Section
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import spikes
 
@@ -73,12 +73,11 @@ class SlopeTab:
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.section = Section(self.theme, "Section of the slope", coordinates=True)
-        self._showing = False
         self._handles: list[Handle] = []
         self._bound: list[Bound | Words] = []
         self._structure: Any = None
-        self._places = ColumnDataSource({"x": [], "y": [], "words": []})
-        self._points = ColumnDataSource({"x": [], "y": []})
+        self._places = HandleSource(self._dragged)
+        self._points = HandleSource(self._dragged_point)
         self._draw_handles()
         self._findings = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._forms = pn.Column(width=WIDE, scroll=True, height=610)
@@ -98,17 +97,17 @@ class SlopeTab:
             return
         site = self.project.site
         self.section.show(site)
-        self._showing = True
         self._handles = handles(site)
         ground = site.profile
-        self._places.data = {
-            "x": [one.x for one in self._handles],
-            "y": [ground.height(one.x) for one in self._handles],
-            "words": [one.words for one in self._handles],
-        }
+        self._places.show(
+            {
+                "x": [one.x for one in self._handles],
+                "y": [ground.height(one.x) for one in self._handles],
+                "words": [one.words for one in self._handles],
+            }
+        )
         near = site.slope.points if len(site.slope.points) <= MOST else ()
-        self._points.data = {"x": [p[0] for p in near], "y": [p[1] for p in near]}
-        self._showing = False
+        self._points.show({"x": [p[0] for p in near], "y": [p[1] for p in near]})
         self._findings.object = self._found(site)
         structure = _structure(site)
         if structure != self._structure:
@@ -123,11 +122,11 @@ class SlopeTab:
     def _draw_handles(self) -> None:
         plot, theme = self.section.plot, self.theme
         places = plot.scatter(
-            "x", "y", source=self._places, marker="circle", size=13, line_width=2,
+            "x", "y", source=self._places.source, marker="circle", size=13, line_width=2,
             fill_color=theme.paper, line_color=theme.accent,
         )  # fmt: skip
         points = plot.scatter(
-            "x", "y", source=self._points, marker="square", size=7, line_width=1,
+            "x", "y", source=self._points.source, marker="square", size=7, line_width=1,
             fill_color=theme.paper, line_color=theme.text, legend_label="points of the survey",
         )  # fmt: skip
         drag = PointDrawTool(renderers=[places, points], add=False, description="drag the handles")
@@ -139,13 +138,9 @@ class SlopeTab:
                 tooltips=[("", "@words"), ("chainage", "@x{0.00} metres")],
             )
         )  # fmt: skip
-        self._places.on_change("data", self._dragged)
-        self._points.on_change("data", self._dragged_point)
 
-    def _dragged(self, _: str, __: Any, new: Any) -> None:
+    def _dragged(self, new: Any) -> None:
         """Move what a handle stands for."""
-        if self._showing:
-            return
         for one, x in zip(self._handles, new["x"], strict=False):
             if abs(float(x) - one.x) > 10.0**-DIGITS / 2:
                 value = round(float(x), DIGITS)
@@ -155,10 +150,8 @@ class SlopeTab:
                 return
         self.show()
 
-    def _dragged_point(self, _: str, __: Any, new: Any) -> None:
+    def _dragged_point(self, new: Any) -> None:
         """Move a point of the survey."""
-        if self._showing:
-            return
         points = self.project.site.slope.points
         for k, (x, y) in enumerate(zip(new["x"], new["y"], strict=False)):
             place = [round(float(x), DIGITS), round(float(y), DIGITS)]

@@ -199,7 +199,7 @@ def test_from_a_survey_to_a_search_that_survives_its_server(serve, chromium, tab
           lambda: band()[1] != end)  # fmt: skip
     assert band()[1] < end
     _open(tab, "Falls")
-    tab.get_by_text("Nothing is released yet.").wait_for()  # a click before is ignored
+    tab.get_by_text("Nothing is released yet.").wait_for()
     tab.get_by_role("button", name="Release 200").click()
     tab.get_by_text("200 of 200 releases").wait_for()
     other = chromium.new_page(viewport={"width": 1280, "height": 720})
@@ -211,8 +211,7 @@ def test_from_a_survey_to_a_search_that_survives_its_server(serve, chromium, tab
     other.close()
     _open(tab, "Decide")
     tab.get_by_role("button", name="Start the search").click()
-    (job,) = [project / "search.job.json"]
-    _wait(job.exists)
+    _wait((project / "search.job.json").exists)
     _wait(lambda: any(project.glob("design-*/evaluations.csv")), 240.0)
     before = load_layout(project / "layout.toml"), Site.load(project / "site.toml")
     server.kill()

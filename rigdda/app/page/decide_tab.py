@@ -138,6 +138,8 @@ class DecideTab:
         return plot
 
     def _begin(self) -> None:
+        """Start the search that the form describes."""
+        self.show()  # the button may be quicker than the tab
         self.page.act(lambda: self.job.start(self._arguments()))
 
     def _arguments(self) -> list[str]:

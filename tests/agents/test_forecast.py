@@ -87,7 +87,7 @@ def test_a_training_of_the_value_network_continues(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("torch")
-    for name, number in dict(RANDOM=2, SINGLES=1, PAIRS=2, EPOCHS=2, RELEASES=10).items():
+    for name, number in dict(RANDOM=2, SINGLES=1, PAIRS=2, EPOCHS=2, LAYOUT_RELEASES=10).items():
         monkeypatch.setattr(value_training, name, number)
     for name, number in dict(LEAST=3, FEWEST=3, MASS=9).items():
         monkeypatch.setattr(value_training, name, number)

@@ -89,7 +89,7 @@ def test_a_training_of_the_value_network_continues(
     pytest.importorskip("torch")
     for name, number in dict(RANDOM=2, SINGLES=1, PAIRS=2, EPOCHS=2, LAYOUT_RELEASES=10).items():
         monkeypatch.setattr(value_training, name, number)
-    for name, number in dict(LEAST=3, FEWEST=3, MASS=9).items():
+    for name, number in dict(LEAST_PER_EVENT=3, LEAST_PER_GROUP=3, MASS=9).items():
         monkeypatch.setattr(value_training, name, number)
     monkeypatch.setattr("rigdda.agents.designers.forecast.ENSEMBLE", 4)
     monkeypatch.setattr(value_training, "DesignProblem", lambda name: DesignProblem(SITE))

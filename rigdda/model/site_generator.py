@@ -10,13 +10,14 @@ family keeps its character.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeVar
 
 import msgspec
 import numpy as np
 
-from rigdda import check
+from rigdda import BadInput, check
 from rigdda.barriers import MeshOption
 from rigdda.ground.prices import Consequences, Prices
 from rigdda.ground.surface import Surface
@@ -36,6 +37,69 @@ ZONE_MARGIN = 0.05
 """Distance downhill of that point at which a zone begins [m]."""
 
 
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """Ranges of the numbers by which the instances of a family differ.
+
+    Parameters
+    ----------
+    height, incline : (float, float)
+        Factor on the height of the slope, and on its length over its height [-].
+    room : (float, float)
+        Factor on the lengths between the toe and the road [-].
+    segment_length, segment_height : (float, float)
+        Further factors on the length and the height of each segment [-].
+    size, rate, closure, price : float
+        Greatest deviations of the logarithms of the block areas, of the rate of each event, of the
+        cost of a day of closure and of the prices of each kind of barrier [-].
+    friction : float
+        Greatest change of the friction angles [deg].
+    restitution : (float, float)
+        Factors on restitution and on rolling resistance [-].
+    access : (float, float)
+        Price factor of access at 60 m above the road [-].
+    """
+
+    height: Range = (0.8, 1.25)
+    incline: Range = (0.93, 1.07)
+    room: Range = (0.85, 1.2)
+    segment_length: Range = (0.94, 1.06)
+    segment_height: Range = (0.96, 1.04)
+    size: float = 0.35
+    rate: float = 0.5
+    closure: float = 0.4
+    price: float = 0.25
+    friction: float = 2.0
+    restitution: Range = (0.75, 1.25)
+    access: Range = (1.0, 2.5)
+
+
+NARROW = Variation()
+"""Ranges of the generated sites of the splits."""
+
+WIDE = Variation(
+    height=(0.55, 1.7),
+    incline=(0.85, 1.18),
+    room=(0.5, 2.2),
+    segment_length=(0.7, 1.4),
+    segment_height=(0.85, 1.18),
+    size=1.0,
+    rate=1.0,
+    closure=1.0,
+    price=0.6,
+    friction=4.0,
+    restitution=(0.5, 1.5),
+    access=(1.0, 3.0),
+)
+"""Wide ranges, with which the best layouts of two instances of a family differ more."""
+
+ATTEMPTS = 20
+"""Largest number of draws for an instance; wide ranges give some sites that are refused."""
+
+
 class StretchedGround:
     """The stretched ground of a built-in site.
 
@@ -45,18 +109,20 @@ class StretchedGround:
         The built-in site.
     rng : numpy.random.Generator
         Generator for the factors.
+    by : Variation
+        Ranges of the factors.
     """
 
-    def __init__(self, site: SiteTables, rng: np.random.Generator):
+    def __init__(self, site: SiteTables, rng: np.random.Generator, by: Variation = NARROW):
         points = np.array(site.slope.points)
-        high = rng.uniform(0.8, 1.25)
-        wide = high * rng.uniform(0.93, 1.07)
+        high = rng.uniform(*by.height)
+        wide = high * rng.uniform(*by.incline)
         runs, drops = np.diff(points[:, 0]), np.diff(points[:, 1])
         on_slope = points[1:, 0] <= site.slope.toe
-        wide_of = np.where(on_slope, wide, rng.uniform(0.85, 1.2))
+        wide_of = np.where(on_slope, wide, rng.uniform(*by.room))
         high_of = np.where(on_slope, high, 1.0)
-        self.x_factor = wide_of * rng.uniform(0.94, 1.06, len(runs))
-        self.y_factor = high_of * rng.uniform(0.96, 1.04, len(runs))
+        self.x_factor = wide_of * rng.uniform(*by.segment_length, len(runs))
+        self.y_factor = high_of * rng.uniform(*by.segment_height, len(runs))
         road = (points[:-1, 0] >= site.road.start) & (points[1:, 0] <= site.road.end)
         self.x_factor[road] = rng.uniform(7.0, 11.0) / (site.road.end - site.road.start)
         # the ground beyond the road is not stretched because it must remain long enough
@@ -97,11 +163,31 @@ class StretchedGround:
         return replace(source, polygon=polygon, joints=joints)
 
 
-def generate(base: S, name: str, number: int) -> S:
-    """Return an instance of the family of a built-in site; it depends on `number` only."""
-    rng = np.random.default_rng([FAMILIES.index(base.name), number])
-    ground = StretchedGround(base, rng)
-    size = float(np.exp(rng.uniform(-0.35, 0.35)))
+def generate(base: S, name: str, number: int, by: Variation = NARROW) -> S:
+    """Return an instance of the family of a built-in site.
+
+    It depends on `number` and the ranges only. A draw that gives an invalid site is repeated.
+
+    Raises
+    ------
+    BadInput
+        If no draw gives a valid site.
+    """
+    seed = [FAMILIES.index(base.name), number]
+    for attempt in range(ATTEMPTS):
+        rng = np.random.default_rng([*seed, attempt] if attempt else seed)
+        try:
+            return _instance(base, name, number, by, rng)
+        except BadInput:
+            if attempt == ATTEMPTS - 1:
+                raise
+    raise AssertionError("the last attempt returns or raises")
+
+
+def _instance(base: S, name: str, number: int, by: Variation, rng: np.random.Generator) -> S:
+    """Return an instance from one series of draws."""
+    ground = StretchedGround(base, rng, by)
+    size = float(np.exp(rng.uniform(-by.size, by.size)))
     sources = tuple(_source(source, ground) for source in base.sources)
     stretches = tuple(
         Stretch(ground.x(s.start), ground.x(s.end), s.surface) for s in base.slope.surfaces
@@ -113,12 +199,12 @@ def generate(base: S, name: str, number: int) -> S:
         description=f"Instance {number} of the family {base.name}. {base.description}",
         slope=slope,
         sources=sources,
-        events=tuple(_event(event, size, rng) for event in base.events),
+        events=tuple(_event(event, size, by, rng) for event in base.events),
         road=Road(ground.x(base.road.start), ground.x(base.road.end)),
         barrier_zone=_zone(base, slope, sources, ground),
-        surfaces=_surfaces(base, rng),
-        prices=_prices(base.prices, rng),
-        consequences=_consequences(base.consequences, rng),
+        surfaces=_surfaces(base, by, rng),
+        prices=_prices(base.prices, by, rng),
+        consequences=_consequences(base.consequences, by, rng),
         meshes=tuple(_mesh(option, ground, rng) for option in base.meshes),
     )
 
@@ -145,9 +231,9 @@ def _source(source: Source, ground: StretchedGround) -> Source:
     return replace(source, band=(ground.x(source.band[0]), ground.x(source.band[1])))
 
 
-def _event(event: Event, size: float, rng: np.random.Generator) -> Event:
+def _event(event: Event, size: float, by: Variation, rng: np.random.Generator) -> Event:
     """Return an event with another rate and another block size."""
-    rate = round(event.rate * float(np.exp(rng.uniform(-0.5, 0.5))), 4)
+    rate = round(event.rate * float(np.exp(rng.uniform(-by.rate, by.rate))), 4)
     if event.area is None:
         return replace(event, rate=rate)
     low, high = (round(area * size, 4) for area in event.area)
@@ -163,8 +249,8 @@ def _zone(
     return replace(zone, start=millimetres(start), end=ground.x(zone.end))
 
 
-def _surfaces(base: SiteTables, rng: np.random.Generator) -> dict[str, Surface]:
-    shift, factor, loss = rng.uniform(-2.0, 2.0), *rng.uniform(0.75, 1.25, 2)
+def _surfaces(base: SiteTables, by: Variation, rng: np.random.Generator) -> dict[str, Surface]:
+    shift, factor, loss = rng.uniform(-by.friction, by.friction), *rng.uniform(*by.restitution, 2)
     return {
         name: replace(
             surface,
@@ -176,22 +262,23 @@ def _surfaces(base: SiteTables, rng: np.random.Generator) -> dict[str, Surface]:
     }
 
 
-def _prices(prices: Prices, rng: np.random.Generator) -> Prices:
+def _prices(prices: Prices, by: Variation, rng: np.random.Generator) -> Prices:
     """Return prices that vary independently by kind of barrier."""
-    fence, ditch, fill, concrete = np.exp(rng.uniform(-0.25, 0.25, 4)).tolist()
+    fence, ditch, fill, concrete = np.exp(rng.uniform(-by.price, by.price, 4)).tolist()
     return replace(
         prices,
         fence={name: round(price * fence, 1) for name, price in prices.fence.items()},
         ditch={name: round(price * ditch, 1) for name, price in prices.ditch.items()},
         embankment=round(prices.embankment * fill, 1),
         concrete=round(prices.concrete * concrete, 1),
-        access=round(rng.uniform(1.0, 2.5), 2),
+        access=round(rng.uniform(*by.access), 2),
     )
 
 
-def _consequences(what: Consequences, rng: np.random.Generator) -> Consequences:
+def _consequences(what: Consequences, by: Variation, rng: np.random.Generator) -> Consequences:
     """Return consequences with another cost per day of closure, as for another traffic volume."""
-    return replace(what, closure=round(what.closure * float(np.exp(rng.uniform(-0.4, 0.4))), -2))
+    factor = float(np.exp(rng.uniform(-by.closure, by.closure)))
+    return replace(what, closure=round(what.closure * factor, -2))
 
 
 def _mesh(option: MeshOption, ground: StretchedGround, rng: np.random.Generator) -> MeshOption:

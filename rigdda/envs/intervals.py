@@ -140,7 +140,6 @@ def mid_p(count: int, releases: int) -> Interval:
     return low, high
 
 
-@lru_cache(maxsize=1 << 16)
 def upper_bound(count: int, releases: int) -> float:
     """Return the one-sided 95 % upper bound of a probability (Clopper and Pearson)."""
     if count >= releases:
@@ -148,7 +147,6 @@ def upper_bound(count: int, releases: int) -> float:
     return float(betaincinv(count + 1, releases - count, CONFIDENCE))
 
 
-@lru_cache(maxsize=1 << 16)
 def lower_bound(count: int, releases: int) -> float:
     """Return the one-sided 95 % lower bound of a probability (Clopper and Pearson)."""
     if count == 0:
@@ -219,7 +217,6 @@ def _half(sample: NDArray[np.float64], known: Known | None) -> float:
     return float(quantile(freedom)) * math.sqrt(squares / freedom / n)
 
 
-@lru_cache(maxsize=1 << 12)
 def quantile(freedom: int) -> float:
     """Return the 97.5 % quantile of Student's t distribution."""
     return float(stdtrit(freedom, 0.5 * (1.0 + CONFIDENCE)))

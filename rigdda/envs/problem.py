@@ -14,7 +14,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 
 import msgspec
 import numpy as np
@@ -292,7 +291,6 @@ def events_of_seeds(shares: Mapping[str, float], seeds: Sequence[int]) -> tuple[
     return tuple(names[i] for i in np.searchsorted(edges, place, side="right"))
 
 
-@lru_cache(maxsize=256)
 def _order(shares: tuple[float, ...], releases: int) -> tuple[int, ...]:
     """Return the index of the event of each release."""
     number = len(shares)

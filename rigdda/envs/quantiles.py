@@ -16,7 +16,6 @@ expected number of positive counts estimated from survey data, Survey Methodolog
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -153,7 +152,6 @@ def _effective(sample: BlockSample, value: float, level: float) -> int:
     return max(1, min(n, math.floor(level * (1.0 - level) / variance)))
 
 
-@lru_cache(maxsize=4096)
 def _ranks(n: int, level: float) -> tuple[float, float]:
     """Return the shares at which the two order statistics lie, outside 0 to 1 if there is none."""
     low, high = binomial_quantile(TAIL, n, level), binomial_quantile(1.0 - TAIL, n, level) + 1

@@ -8,7 +8,6 @@ edges have half to two thirds of the mass of a full box, as have these outlines.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -342,7 +341,6 @@ def reach(source: Source, event: Event) -> float:
     return math.sqrt(event.area[1] / least * source.aspect[1])
 
 
-@lru_cache(maxsize=256)
 def line(points: tuple[Point, ...]) -> NDArray[np.float64]:
     """Return the corners of the ground as an array, (m, 2) [m]."""
     return np.array(points, dtype=np.float64)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import enum
 import math
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 from itertools import islice
@@ -551,7 +551,7 @@ def trajectory_parts(
     tolerance: float = 0.1,
     threads: int | None = None,
     size: int = 25,
-) -> Iterator[Trajectories]:
+) -> Generator[Trajectories, None, None]:
     """Yield the trajectories of `trajectories` in parts, as soon as each is computed.
 
     The parts are in the order of the seeds, but each release of an event with many blocks is a part
@@ -610,7 +610,7 @@ AHEAD = 4
 """Number of parts for each thread that are computed before the first of them is taken."""
 
 
-def _computed(asked: _Asked, parts: Sequence[Sequence[int]]) -> Iterator[Trajectories]:
+def _computed(asked: _Asked, parts: Sequence[Sequence[int]]) -> Generator[Trajectories, None, None]:
     """Yield the trajectories of parts of the seeds, computed in threads."""
     free: SimpleQueue[RecordedReleases] = SimpleQueue()
 

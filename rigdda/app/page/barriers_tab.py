@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rigdda.app.page.workspace import Host
 
 DRAWN = 60
-"""Number of releases whose ways are drawn."""
+"""Number of releases whose paths are drawn."""
 
 WIDE = 470
 """Width of the column of figures [pixels]."""
@@ -101,7 +101,7 @@ class BarriersTab:
         self._seen = -1
 
     def tick(self) -> None:
-        """Show the ways and the figures that were computed meanwhile."""
+        """Show the paths and the figures that were computed meanwhile."""
         self._stream()
         if self._seen != self.live.revision:
             self._seen = self.live.revision
@@ -205,7 +205,7 @@ class BarriersTab:
         return getattr(layout[i], field, None) if i < len(layout) else None
 
     def _start(self) -> None:
-        """Begin to draw the ways of releases with the layout."""
+        """Begin to draw the paths of releases with the layout."""
         if self._release is not None:
             self._release.stop()
         site = self.project.site
@@ -275,7 +275,7 @@ class BarriersTab:
 
 
 def ways(falls: list[Fall], colour: Callable[[Fall], str]) -> dict[str, list[Any]]:
-    """Return the data of ways for a section."""
+    """Return the data of paths for a section."""
     return {
         "xs": [fall.x for fall in falls],
         "ys": [fall.y for fall in falls],

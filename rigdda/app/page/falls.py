@@ -188,5 +188,5 @@ class Release:
             self.falls += falls_of(self.site, found)
             self.done += len(found.seed)
             if self._stop.is_set():
-                parts.close()  # type: ignore[attr-defined]  # it is a generator
+                parts.close()
                 return

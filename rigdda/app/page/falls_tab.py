@@ -95,7 +95,7 @@ class FallsTab:
 
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
-        self.section = Section(self.theme, "Releases; a click on a way replays it", 330)
+        self.section = Section(self.theme, "Releases; a click on a path replays it", 330)
         self._release: Release | None = None
         self._passed: Passed | None = None
         self._shown: Any = None
@@ -198,7 +198,7 @@ class FallsTab:
             drag,
             TapTool(renderers=[self.section.ways_renderer], description="replay a way"),
             HoverTool(renderers=[self.section.ways_renderer], tooltips=[("", "@words")],
-                      description="names of the ways"),
+                      description="names of the paths"),
         )  # fmt: skip
         plot.toolbar.active_drag = drag
         self._line.on_change("data", self._dragged)
@@ -432,7 +432,7 @@ class FallsTab:
             self._collect()
 
     def _picked(self, _: str, __: Any, new: list[int]) -> None:
-        """Replay the release whose way was clicked."""
+        """Replay the release whose path was clicked."""
         if not new or self._release is None or new[0] >= len(self._release.falls):
             return
         fall = self._release.falls[new[0]]

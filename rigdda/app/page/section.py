@@ -1,4 +1,4 @@
-"""The section of a slope as a Bokeh figure to scale, with ground, road, barriers and ways."""
+"""The section of a slope as a Bokeh figure to scale, with ground, road, barriers and paths."""
 
 from __future__ import annotations
 

@@ -118,8 +118,8 @@ class Verification:
         Parameters
         ----------
         evaluations : sequence of Evaluation
-            Evaluations of layouts on all their releases, which are the same for all. No barrier is
-            the first and the recommended layout is the last.
+            Evaluations of the layouts that may be built, on all their releases, which are the same
+            for all. No barrier is the first and the recommended layout is the last.
         precision : float
             Half of the width of an interval over Z [-].
         """

@@ -23,13 +23,13 @@ from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.forecast import Forecast, forecast_seeds
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.race import joined
 from rigdda.agents.network import Network, scaling
 from rigdda.agents.run_record import check_terms
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
 from rigdda.files import atomic
+from rigdda.seeds import release_seeds
 
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]

@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from rigdda import Block, Event, Site, Source
+from rigdda import Block, Event, Site, Source, seeds
 from rigdda.app import new_site
 from rigdda.app.reports.pictures import DPI, FONT, save, sources
 from rigdda.app.reports.tables import empty_table
@@ -313,7 +313,7 @@ def _source(source: Source) -> str:
 
 def _areas(source: Source, seed: int) -> list[float]:
     """Return the areas of the blocks of a mass or of given blocks [m2]."""
-    outlines = source.cut(np.random.default_rng([seed, 0]))
+    outlines = source.cut(seeds.generator(seed, 0))
     return [abs(polygon_properties(outline)[0]) for outline in outlines]
 
 
@@ -941,7 +941,7 @@ def _draw_sources(axes: Axes, site: Site) -> None:
     """Draw bands as lines on the ground, and the blocks of masses."""
     for source in site.sources:
         if source.band is None:
-            blocks = [Block(outline) for outline in source.cut(np.random.default_rng([0, 0]))]
+            blocks = [Block(outline) for outline in source.cut(seeds.generator(0, 0))]
             for block in blocks:
                 axes.fill(*block.vertices.T, facecolor=ROCK, edgecolor="white", linewidth=0.4,
                           zorder=3)  # fmt: skip

@@ -11,11 +11,11 @@ from dataclasses import replace
 from statistics import NormalDist
 
 from rigdda import Layout, Outcome
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem, Evaluation, ensemble
 from rigdda.envs.comparison import Difference, difference
 from rigdda.envs.intervals import CONFIDENCE
+from rigdda.seeds import release_seeds
 
 LEAST = 100
 """Least number of releases of a layout after which a verification may end. With fewer, intervals of

@@ -23,7 +23,7 @@ from rigdda import (
     Site,
 )
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import Ledger, release_seeds
+from rigdda.agents.designers.protocol import Ledger
 from rigdda.barriers import Removal
 from rigdda.barriers.base import ELEMENT
 from rigdda.barriers.fence import PANEL
@@ -31,6 +31,7 @@ from rigdda.barriers.gravity_wall import SLID
 from rigdda.envs import DesignProblem
 from rigdda.envs.outcome_cache import Memory, release_key
 from rigdda.geometry import polygon_properties
+from rigdda.seeds import release_seeds
 
 Floats = NDArray[np.float64]
 

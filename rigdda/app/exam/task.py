@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda import BadInput, Barrier, Layout, Site, check
 from rigdda.agents.designers import catalogue
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.store import Ask, Store, StoredEvaluation
 from rigdda.app.exam.messages import (
     AnyReply,
@@ -32,6 +31,7 @@ from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.observation import Arrays, observe
 from rigdda.envs.problem import is_vector
+from rigdda.seeds import release_seeds
 
 
 class Line(Protocol):

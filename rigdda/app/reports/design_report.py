@@ -19,7 +19,6 @@ from rigdda import Layout, Site
 from rigdda.agents.designers import rule
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.rule import RuleAnswer
 from rigdda.app import archive
 from rigdda.app.barrier_checks import BarrierCheck, LayoutChecks
@@ -51,6 +50,7 @@ from rigdda.envs.intervals import Estimate
 from rigdda.envs.problem import MET, MISSED, UNDECIDED
 from rigdda.envs.replay_record import release_record
 from rigdda.replay.recording import Marks
+from rigdda.seeds import release_seeds
 
 
 def interim_line(cases: Sequence[VerifiedLayout]) -> str:

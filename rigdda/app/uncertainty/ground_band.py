@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Layout, Site
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.app.design_study import DesignStudy, design_events
 from rigdda.app.simulate import PARTS
 from rigdda.app.uncertainty.parameters import (
@@ -33,6 +32,7 @@ from rigdda.app.uncertainty.parameters import (
 from rigdda.app.uncertainty.varied_sites import Priced, SimulatedSite, noise, price, simulate
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.cost import judge
+from rigdda.seeds import release_seeds
 
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]

@@ -1,6 +1,7 @@
 """Estimates of the effect of every barrier of the menu from releases without barriers.
 
 The ensemble of these releases records all blocks that pass each station. Several designers use it.
+The list of designers is `rigdda.agents.designers.DESIGNERS`.
 """
 
 from __future__ import annotations

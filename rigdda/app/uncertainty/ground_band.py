@@ -99,7 +99,7 @@ class GroundSample:
 
     @property
     def state(self) -> State:
-        """Whether the chosen layout is the cheapest, dearer than another one, or undecided.
+        """Whether the chosen layout is the cheapest, costs more than another, or is undecided.
 
         It is undecided if another layout is cheaper, but not by more than the noise of the
         difference on the same releases.
@@ -108,8 +108,8 @@ class GroundSample:
         if chosen.objective <= best.objective:
             return "cheapest"
         error = math.sqrt(float(noise((chosen.terms - best.terms)[None], self.strata)[0]))
-        dearer = chosen.objective - best.objective > CLEAR_ERRORS * error
-        return "dearer" if dearer else "undecided"
+        costs_more = chosen.objective - best.objective > CLEAR_ERRORS * error
+        return "dearer" if costs_more else "undecided"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

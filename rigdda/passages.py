@@ -2,7 +2,7 @@
 
 The state of a block at a station is that of the first step at which its centroid is at or beyond
 the station. Nothing depends on the interval of recorded frames. The motion is that of
-`rigdda.releases.Batch`, see `rigdda.releases` for the ways in which releases are computed.
+`rigdda.releases.Batch`; `rigdda.releases` describes the ways in which releases are computed.
 """
 
 from __future__ import annotations

@@ -25,8 +25,8 @@ from rigdda.app.exam.task import Task
 from rigdda.barriers import from_table
 from rigdda.envs import DesignProblem
 
-COUNT = "its counter says {told:,} releases, but the scorer counted {used:,}"
-"""Reason for a flag."""
+BEYOND = "asked for more releases than its budget, past the count of its task"
+"""Reason for a flag. A task refuses such requests itself, so the scorer receives none from it."""
 
 
 class ReleaseCounter:
@@ -59,14 +59,8 @@ class ReleaseCounter:
         if reason not in self.flags:
             self.flags.append(reason)
 
-    def compare(self, told: int) -> None:
-        """Flag the entry if its own count differs."""
-        if told != self.used:
-            self.flag(COUNT.format(told=told, used=self.used))
-
     def answer(self, request: ReleaseRequest) -> AnyReply:
         """Return the reply to a request; a refusal says what is wrong."""
-        self.compare(request.used)
         try:
             return self.ask(request)
         except BadInput as bad:
@@ -86,6 +80,7 @@ class ReleaseCounter:
         count, left = request.releases, self.budget - self.used
         if count > left:
             self.refused += 1
+            self.flag(BEYOND)
             hint = f"ask for at most the {left:,} that are left of {self.budget:,}"
             raise BadInput("releases", count, hint)
         place = check.integer("section", request.section, 0, len(self.problems) - 1)

@@ -166,8 +166,8 @@ def _submission(
     try:
         layouts = [_tables(own, layout) for own, layout in zip(sections, found, strict=True)]
     except (BadInput, TypeError, ValueError) as error:
-        return SubmitRequest(task.used, [], str(error))
-    return SubmitRequest(task.used, layouts)
+        return SubmitRequest([], str(error))
+    return SubmitRequest(layouts)
 
 
 def _tables(task: Task, layout: Any) -> list[dict[str, Any]]:

@@ -39,15 +39,12 @@ class ReleaseRequest(Message, frozen=True):
     stations : list of float, optional
         If given, the layout is ignored, and the reply contains the blocks that cross these stations
         [m] in releases without barriers.
-    used : int
-        Number of releases that the entry counted itself.
     """
 
     section: int
     layout: Tables
     seeds: Seeds
     stations: list[float] | None = None
-    used: int = 0
 
     @property
     def releases(self) -> int:
@@ -59,7 +56,6 @@ class ReleaseRequest(Message, frozen=True):
 class SubmitRequest(Message, frozen=True):
     """Submit one layout for each section; `wrong` says why there are none."""
 
-    used: int
     layouts: list[Tables]
     wrong: str = ""
 

@@ -322,7 +322,6 @@ def _submission(
     request: SubmitRequest,
 ) -> Submission:
     """Return a checked submission; one that cannot be built is flagged and has no layouts."""
-    counter.compare(request.used)
     layouts: list[Tables] = []
     try:
         if request.wrong:

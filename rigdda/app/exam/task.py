@@ -191,7 +191,7 @@ class Task:
         self, layout: Tables, seeds: Seeds, stations: list[float] | None = None
     ) -> BatchReply | CrossingsReply:
         """Return the reply to a request for releases, if so many are left."""
-        request = ReleaseRequest(self._section, layout, seeds, stations, self._line.used)
+        request = ReleaseRequest(self._section, layout, seeds, stations)
         if request.releases > self.left:
             hint = f"ask for at most the {self.left:,} that are left of {self.budget:,}"
             raise BadInput("releases", request.releases, hint)

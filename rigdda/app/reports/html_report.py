@@ -23,7 +23,7 @@ import msgspec
 import rigdda
 from rigdda import BadInput, Site, Surface
 from rigdda.agents.run_record import RunRecord
-from rigdda.app import site_check
+from rigdda.app import site_check, site_picture
 from rigdda.app.reports import findings
 from rigdda.app.reports.findings import DesignAnswer, FailedCheck, headline
 from rigdda.app.reports.html_blocks import (
@@ -456,7 +456,7 @@ def site_blocks(site: Site) -> Iterator[Block]:
     yield Paragraph(site.description)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "site.png"
-        site_check.draw(file, site)
+        site_picture.draw(file, site)
         caption = "Ground, sources of rock, barrier zone and road, to scale."
         yield picture(file.with_suffix(".svg"), "Section of the site", caption, "site")
     yield Items([_sentence(line, site.name) for line in site_check.facts(site)])

@@ -41,7 +41,7 @@ STREAMS = ("search", "semifinal", "final", "report", "ensemble", "verification")
 again, to choose one of them; report: the chosen layout, for an unbiased evaluation; ensemble:
 releases without barriers that a designer analyses; verification: releases that no search uses."""
 
-PARTS = {"blocks": (), "strengths": (1,), "pits": (2,), "stems": (3,)}
+RANDOM_PARTS = {"blocks": (), "strengths": (1,), "pits": (2,), "stems": (3,)}
 """Words that follow the seed and the event for each random part of a release."""
 
 Part = Literal["blocks", "strengths", "pits", "stems"]
@@ -62,7 +62,7 @@ def entropy(seed: int, event: int, part: Part = "blocks") -> tuple[int, ...]:
     part : str
         Blocks with the friction of the ground, strengths of surfaces, pits, or stems of a forest.
     """
-    return (seed, event, *PARTS[part])
+    return (seed, event, *RANDOM_PARTS[part])
 
 
 def generator(seed: int, event: int, part: Part = "blocks") -> np.random.Generator:

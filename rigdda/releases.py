@@ -1,8 +1,18 @@
 """Releases: simulations of a site with a layout for one seed or many.
 
-Releases of one site with one layout share everything that does not depend on the seed. Most of them
-are of a single block, whose descent is computed in less than a millisecond; for these, the ground,
-the positions of barriers and the interface properties are prepared once.
+The descent of a release is computed in one of three ways, which give the same outcomes bit for bit
+(`tests/reliability/test_single_blocks.py`):
+
+- `simulation` packs a scene of its own. `release` uses it, because it returns the frames of a run.
+- `Batch` computes many releases of one site with one layout, which share everything that does not
+  depend on the seed. With several blocks, it resets the arrays of a
+  `rigdda.dynamics.template.Template` instead of packing a scene.
+- `SingleReleases` computes releases of a single block for a `Batch`, where `can_share` allows it.
+  They need no scene at all, see `rigdda.dynamics.single_block`. Most releases are of this kind and
+  take less than a millisecond.
+
+`rigdda.trajectory` and `rigdda.passages` have no way of their own: both read the motion of a
+`Batch`, the first in every step (`StepRecord`) and the second at stations.
 """
 
 from __future__ import annotations

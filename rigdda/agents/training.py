@@ -39,7 +39,7 @@ from rigdda.envs import DesignProblem, forecast_table
 from rigdda.envs.envelope import largest
 from rigdda.envs.forecast_table import ForecastTable
 from rigdda.files import atomic
-from rigdda.model.site_names import built_in, instance
+from rigdda.model.site_names import TRAINING_SPLIT, built_in, instance
 
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]
@@ -85,7 +85,7 @@ class Terms:
 
     def __post_init__(self) -> None:
         if self.sites:
-            check.integer("sites", self.sites, 2, len(sites.split("train")))
+            check.integer("sites", self.sites, 2, len(sites.split(TRAINING_SPLIT)))
         check.one_of("algorithm", self.algorithm, ALGORITHMS)
         check.integer("simulate", self.simulate, 0, forecasts.LAYOUTS)
         check.integer("seed", self.seed, 0, limits.SEED)
@@ -163,7 +163,7 @@ def table_of(terms: Terms, out: Path, tick: Tick) -> ForecastTable:
         return table
     folder, catalogue = out / "sites", candidates()
     folder.mkdir(parents=True, exist_ok=True)
-    names = sites.split("train")[: terms.sites]
+    names = sites.split(TRAINING_SPLIT)[: terms.sites]
     found = forecasts.collect(names, catalogue, folder, tick)
     kept = forecasts.choose(np.array([own.z for own in found]), catalogue, forecasts.LAYOUTS)
     notes = {"command": f"rigdda train --sites {terms.sites}"}
@@ -189,7 +189,7 @@ def learn(
     except ModuleNotFoundError as error:
         hint = f"install {error.name}: pip install 'rigdda[rl]'"
         raise BadInput("model", "policy", hint) from None
-    rows = table.rows("train")
+    rows = table.rows(TRAINING_SPLIT)
     given, mask = table.features[rows], table.mask[rows]
     bare = Network(*scaling(given[mask]), [], notes)
     torch.set_num_threads(1)
@@ -238,7 +238,7 @@ def best_of_families(table: ForecastTable) -> dict[str, list[int]]:
     A layout that cannot be built on a site counts as no barrier there. Layouts are given by their
     numbers in the catalogue, the best first.
     """
-    rows = table.rows("train")
+    rows = table.rows(TRAINING_SPLIT)
     families = np.array([family_of(table.names[row]) for row in rows])
     reward = table.reward[rows]
     return {

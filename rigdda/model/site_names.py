@@ -10,6 +10,9 @@ from rigdda.errors import BadInput
 FAMILIES = ("verge", "bench", "talus", "narrow", "cliff", "shu-hwa")
 """Families of design sites, each named after its built-in site."""
 
+TRAINING_SPLIT = "train"
+"""Split that policies, the value network and the agent of corridors are trained on."""
+
 SPLITS = {
     "train": range(1200),
     "validation": range(10**6, 10**6 + 60),

@@ -3,7 +3,8 @@
 Describing a block and its surroundings in Python takes as long as simulating its descent. Here,
 kernels write the block and the interface properties into the arrays of a similar scene and read the
 results. All entries that are used are bit-identical to those that `rigdda.dynamics.packing.pack`
-gives for a scene of that block.
+gives for a scene of that block. This is one of the three ways in which releases are computed, see
+`rigdda.releases`.
 """
 
 from __future__ import annotations

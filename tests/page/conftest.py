@@ -52,6 +52,7 @@ class Server:
             self.process.wait(20)
         finally:
             self.kill()
+        assert "Traceback" not in self.log.read_text(), self.log.read_text()
 
 
 @pytest.fixture

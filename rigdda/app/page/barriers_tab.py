@@ -61,7 +61,7 @@ class BarriersTab:
         self._rules = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._command = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._alternatives = pn.Column(width=WIDE - 20)
-        self._name = pn.widgets.TextInput(name="Name of an alternative", width=200)
+        self._name = pn.widgets.TextInput(label="Name of an alternative", width=200)
         self.panel = pn.Row(
             pn.Column(
                 self._palette, self.section.plot, self._rules, self._forms, self._command,
@@ -84,7 +84,7 @@ class BarriersTab:
         self.section.show(site, layout)
         self._show_grips()
         kinds = placing.kinds_for(site)
-        if [one.name for one in self._palette] != [f"Add {NAMES[k].lower()}" for k in kinds]:
+        if [one.label for one in self._palette] != [f"Add {NAMES[k].lower()}" for k in kinds]:
             self._palette[:] = [
                 button(f"Add {NAMES[kind].lower()}", partial(self._add, kind)) for kind in kinds
             ]
@@ -192,7 +192,7 @@ class BarriersTab:
         if field == "energy_class":
             options = {f"{name:,}": name for name in FENCE_CLASSES}
             widget = pn.widgets.Select(
-                name="Energy class [kilojoules]", options=options, width=width, margin=(2, 8)
+                label="Energy class [kilojoules]", options=options, width=width, margin=(2, 8)
             )
             found = Bound(widget, get, write)
         else:

@@ -18,6 +18,7 @@ from rigdda.app.page.barriers_tab import NAMES, shown
 from rigdda.app.page.forms import Bound, button, heading, in_words, paragraph, text
 from rigdda.app.page.jobs import CANCELLED, FAILED, INTERRUPTED, RUNNING, Tried, tried
 from rigdda.app.page.live import MOST_BARRIERS
+from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.section import plain_axes
 from rigdda.app.page.theme import SERIES
 from rigdda.envs import DesignProblem
@@ -58,27 +59,27 @@ class DecideTab:
         self._bound: list[Bound] = []
         self._structure: Any = None
         self._designer = pn.widgets.Select(
-            name="Search method", options=list(DESIGNERS), value=DEFAULT, width=130
+            label="Search method", options=list(DESIGNERS), value=DEFAULT, width=130
         )
         self._budget = pn.widgets.IntInput(
-            name="Releases of the search", value=BUDGET, start=2, step=1000, width=150
+            label="Releases of the search", value=BUDGET, start=2, step=1000, width=150
         )
         self._verify = pn.widgets.IntInput(
-            name="Releases to verify each", value=VERIFY, start=10, step=100, width=150
+            label="Releases to verify each", value=VERIFY, start=10, step=100, width=150
         )
         self._cost = pn.widgets.FloatInput(
-            name="At most to build [EUR per metre]", value=None, start=0.0, width=190
+            label="At most to build [EUR per metre]", value=None, start=0.0, width=190
         )
-        self._kinds = pn.widgets.CheckBoxGroup(name="Kinds", options={}, inline=True)
+        self._kinds = pn.widgets.CheckBoxGroup(label="Kinds", options={}, inline=True)
         self._start = button("Start the search", self._begin, primary=True)
         self._cancel = button("Cancel", lambda: self.page.act(self.job.cancel))
         self._resume = button("Resume", lambda: self.page.act(self.job.resume))
         self._bar = pn.indicators.Progress(value=0, max=100, width=300, margin=(14, 8))
         self._status = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._only = pn.widgets.Checkbox(
-            name="Only layouts that meet every check of their barriers", value=False
+            label="Only layouts that meet every check of their barriers", value=False
         )
-        self._only.param.watch(lambda _: self._show_found(), "value")
+        watch(self._only, self._show_found)
         self._points = ColumnDataSource({"x": [], "y": [], "colour": [], "words": [], "place": []})
         self._plot = self._diagram()
         self._table = pn.Column(sizing_mode="stretch_width")
@@ -134,7 +135,7 @@ class DecideTab:
         )
         plain_axes(plot, self.theme)
         plot.visible = False
-        self._points.selected.on_change("indices", self._picked)
+        on_change(self._points.selected, "indices", self._picked)
         return plot
 
     def _begin(self) -> None:
@@ -226,7 +227,7 @@ class DecideTab:
             )  # fmt: skip
         self._table[:] = rows
 
-    def _picked(self, _: str, __: Any, new: list[int]) -> None:
+    def _picked(self, new: list[int]) -> None:
         if new and new[0] < len(self._listed):
             self._take(self._listed[new[0]])
             self._points.selected.indices = []
@@ -250,7 +251,7 @@ class DecideTab:
                 if isinstance(field.default, float) and field.default > 0.0:
                     path = (table, field.name)
                     widget = pn.widgets.EditableFloatSlider(
-                        name=in_words(field.name, field.unit), start=0.0,
+                        label=in_words(field.name, field.unit), start=0.0,
                         end=3.0 * field.default, step=field.default / 100.0, width=WIDE - 60,
                         margin=(2, 8),
                     )  # fmt: skip

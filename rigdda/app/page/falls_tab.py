@@ -17,6 +17,7 @@ from rigdda import Error
 from rigdda.app.page.barriers_tab import shown, ways
 from rigdda.app.page.falls import ENDS, Fall, Release, shares
 from rigdda.app.page.forms import button, heading, in_words, paragraph, table
+from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.section import Section, plain_axes
 from rigdda.app.page.theme import SCALE, SERIES
 from rigdda.app.reports import simulation_report, stations
@@ -102,10 +103,10 @@ class FallsTab:
         self._drawn = 0
         self._for: Any = None
         self._replayed: Fall | None = None
-        self._event = pn.widgets.Select(name="Event", options=[], width=150)
-        self._built = pn.widgets.Checkbox(name="With the layout", value=True, margin=(24, 8))
+        self._event = pn.widgets.Select(label="Event", options=[], width=150)
+        self._built = pn.widgets.Checkbox(label="With the layout", value=True, margin=(24, 8))
         self._by = pn.widgets.Select(
-            name="Colour by", options=[BY_END, BY_EVENT, BY_SPEED, BY_ENERGY], width=150
+            label="Colour by", options=[BY_END, BY_EVENT, BY_SPEED, BY_ENERGY], width=150
         )
         self._go = button(f"Release {BATCH}", self._more, primary=True, margin=(18, 8))
         self._stop = button("Stop", self._end, margin=(18, 8))
@@ -113,9 +114,9 @@ class FallsTab:
         self._legend = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._shares = pn.pane.HTML("", width=WIDE - 20)
         self._collector = pn.pane.HTML("", width=WIDE - 20)
-        self._station = pn.widgets.FloatInput(name="Collector at chainage [metres]", width=190)
+        self._station = pn.widgets.FloatInput(label="Collector at chainage [metres]", width=190)
         labels = {in_words(QUANTITIES[q].words, QUANTITIES[q].unit): q for q in COLLECTED}
-        self._what = pn.widgets.Select(name="Quantity", options=labels, width=190)
+        self._what = pn.widgets.Select(label="Quantity", options=labels, width=190)
         self._command = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._envelope = ColumnDataSource({"x": [], "energy": [], "height": []})
         self._bars = ColumnDataSource({"left": [], "right": [], "top": []})
@@ -125,17 +126,17 @@ class FallsTab:
         self._hits = ColumnDataSource({"x": [], "y": []})
         self._track = ColumnDataSource({"x": [], "energy": [], "height": []})
         self._time = pn.widgets.FloatSlider(
-            name="Time of the replay [seconds]", start=0.0, end=1.0, step=0.02, visible=False
+            label="Time of the replay [seconds]", start=0.0, end=1.0, step=0.02, visible=False
         )
-        self._play = pn.widgets.Toggle(name="Play", width=80, visible=False, margin=(12, 8))
+        self._play = pn.widgets.Toggle(label="Play", width=80, visible=False, margin=(12, 8))
         self._rerun = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._draw()
         for widget in (self._event, self._built):
-            widget.param.watch(lambda _: self._reset(), "value")
-        self._by.param.watch(lambda _: self._recolour(), "value")
-        self._station.param.watch(self._moved, "value")
-        self._what.param.watch(lambda _: self._show_collector(), "value")
-        self._time.param.watch(lambda _: self._show_block(), "value")
+            watch(widget, self._reset)
+        watch(self._by, self._recolour)
+        watch(self._station, self._moved)
+        watch(self._what, self._show_collector)
+        watch(self._time, self._show_block)
         self._put = pn.Row(self._event, self._built, self._by, self._go, self._stop, self._status)
         self.panel = pn.Row(
             pn.Column(self._put, self._legend, self.section.plot, self._envelopes, self._command,
@@ -157,7 +158,7 @@ class FallsTab:
         if self._for == (site, layout):
             return
         self._for = site, layout
-        if self._event.options != site.event_names:
+        if self._event.options != list(site.event_names):
             self._event.options = list(site.event_names)
             self._event.value = site.event_names[0]
         low, high = site.slope.points[0][0], site.slope.points[-1][0]
@@ -201,8 +202,8 @@ class FallsTab:
                       description="names of the paths"),
         )  # fmt: skip
         plot.toolbar.active_drag = drag
-        self._line.on_change("data", self._dragged)
-        self.section.ways.selected.on_change("indices", self._picked)
+        on_change(self._line, "data", self._dragged)
+        on_change(self.section.ways.selected, "indices", self._picked)
         self._envelopes = self._small(
             "95 % of passing blocks are below", "chainage [metres]", "energy [kilojoules]",
             plot.x_range,
@@ -258,6 +259,7 @@ class FallsTab:
 
     def _more(self) -> None:
         """Release more rock."""
+        self.show()  # the button may be quicker than the tab
         if not self.project.has_site or not self._event.value:
             return
         if self._release is None:
@@ -420,18 +422,18 @@ class FallsTab:
         self._line_x = x
         self._line.data = {"x": [x, x], "y": [y, y + tall], "words": ["collector"] * 2}
 
-    def _dragged(self, _: str, __: Any, new: Any) -> None:
+    def _dragged(self, new: Any) -> None:
         moved = [float(x) for x in new["x"] if abs(float(x) - self._line_x) > 1e-6]
         if moved:
             self._station.value = round(moved[0], 1)
             self._show_line()
 
-    def _moved(self, _: Any) -> None:
+    def _moved(self) -> None:
         if self.project.has_site and self._station.value is not None:
             self._show_line()
             self._collect()
 
-    def _picked(self, _: str, __: Any, new: list[int]) -> None:
+    def _picked(self, new: list[int]) -> None:
         """Replay the release whose path was clicked."""
         if not new or self._release is None or new[0] >= len(self._release.falls):
             return

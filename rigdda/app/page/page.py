@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable
+from functools import partial
 
 import panel as pn
 
@@ -12,6 +13,7 @@ from rigdda.app.page.barriers_tab import BarriersTab
 from rigdda.app.page.decide_tab import DecideTab
 from rigdda.app.page.falls_tab import FallsTab
 from rigdda.app.page.forms import button
+from rigdda.app.page.locking import holding, watch
 from rigdda.app.page.report_tab import ReportTab
 from rigdda.app.page.slope_tab import SlopeTab
 from rigdda.app.page.state import Conflict
@@ -54,7 +56,7 @@ class Page:
         self._tabs = pn.Tabs(
             *((tab.title, tab.panel) for tab in self.tabs), sizing_mode="stretch_width"
         )
-        self._tabs.param.watch(lambda _: self._later(), "active")
+        watch(self._tabs, self._refresh, "active")
         other = "light" if theme.name == "dark" else "dark"
         link = pn.pane.HTML(
             f"<a href='?theme={other}' style='color:{theme.accent}'>{other} colours</a>",
@@ -71,7 +73,7 @@ class Page:
         if document is None:  # in a notebook
             pn.state.add_periodic_callback(self._tick, TICK)
         else:  # Bokeh locks the document while its own callbacks run
-            document.add_periodic_callback(self._tick, TICK)
+            document.add_periodic_callback(partial(holding, self._tick), TICK)
 
     @property
     def active(self) -> Tab:

@@ -32,8 +32,8 @@ class ReportTab:
         self.page, self.project, self.theme = page, page.project, page.theme
         self.job, self.study = page.workspace.report, page.workspace.study
         self._count = 0
-        self._results = pn.widgets.CheckBoxGroup(name="Results", options=[])
-        self._pdf = pn.widgets.Checkbox(name="Print it to PDF as well", value=True)
+        self._results = pn.widgets.CheckBoxGroup(label="Results", options=[])
+        self._pdf = pn.widgets.Checkbox(label="Print it to PDF as well", value=True)
         self._write = button("Write the report", self._begin, primary=True)
         self._again = button("Compute the results of this layout", self._compute)
         self._status = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))

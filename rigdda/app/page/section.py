@@ -13,6 +13,7 @@ from bokeh.models import ColumnDataSource, HoverTool, Range1d
 from bokeh.plotting import figure
 
 from rigdda import BadInput, Layout, Site
+from rigdda.app.page.locking import on_change
 from rigdda.app.page.theme import Theme
 from rigdda.app.reports.pictures import sources
 from rigdda.barriers import Earthwork, earthworks
@@ -229,7 +230,7 @@ class HandleSource:
         self._dragged = dragged
         self._given: deque[tuple[list[float], list[float]]] = deque(maxlen=GIVEN)
         self._showing = False
-        self.source.on_change("data", self._changed)
+        on_change(self.source, "data", self._changed)
 
     def show(self, data: dict[str, list[Any]]) -> None:
         """Show handles at other positions."""
@@ -238,6 +239,6 @@ class HandleSource:
         self.source.data = data
         self._showing = False
 
-    def _changed(self, _: str, __: Any, new: Any) -> None:
+    def _changed(self, new: Any) -> None:
         if not self._showing and (list(new["x"]), list(new["y"])) not in self._given:
             self._dragged(new)

@@ -310,7 +310,7 @@ class SlopeTab:
                 start=1e-3,
             )  # fmt: skip
             design = Bound(
-                pn.widgets.Checkbox(name="Design event", margin=(18, 8)),
+                pn.widgets.Checkbox(label="Design event", margin=(18, 8)),
                 partial(_design, self.project, i),
                 self._set(("events", i, "design"), "design event"),
             )
@@ -363,13 +363,13 @@ class SlopeTab:
 
     def _importer(self) -> Any:
         """Return the form that makes a site of a survey."""
-        name = pn.widgets.TextInput(name="Name of the site", value="section", width=340)
+        name = pn.widgets.TextInput(label="Name of the site", value="section", width=340)
         file = pn.widgets.FileInput(
-            name="Survey", accept=".csv,.txt,.tsv,.xyz,.dat,.dxf", width=340
+            label="Survey", accept=".csv,.txt,.tsv,.xyz,.dat,.dxf", width=340
         )
-        layer = pn.widgets.TextInput(name="Layer of a drawing, if it has several", width=340)
+        layer = pn.widgets.TextInput(label="Layer of a drawing, if it has several", width=340)
         road = [
-            pn.widgets.FloatInput(name=f"Road, {w} edge [metres]", value=None, width=160)
+            pn.widgets.FloatInput(label=f"Road, {w} edge [metres]", value=None, width=160)
             for w in ("one", "other")
         ]
 

@@ -11,7 +11,8 @@ from light_site import LIGHT
 from rigdda import Fence, save_layout
 from rigdda.app.cli import main
 from rigdda.app.page.falls import ENDS, Release, shares
-from rigdda.app.page.live import CURRENT, Live, study_table
+from rigdda.app.page.figures import study_table
+from rigdda.app.page.live import CURRENT, Live
 
 LAYOUT = (Fence(30.0, 4.0, energy_class=1000),)
 

@@ -1,5 +1,7 @@
 """The tabs without a server: what their buttons do to the project and to what is computed."""
 
+import html
+import time
 import types
 
 import pytest
@@ -10,6 +12,7 @@ pn = pytest.importorskip("panel", reason="the extra page is not installed")
 from panel.io.state import set_curdoc  # noqa: E402
 
 from rigdda import sites  # noqa: E402
+from rigdda.app import site_check  # noqa: E402
 from rigdda.app.page import locking  # noqa: E402
 from rigdda.app.page.falls_tab import BATCH, FallsTab  # noqa: E402
 from rigdda.app.page.state import Project  # noqa: E402
@@ -77,3 +80,21 @@ def test_callbacks_wait_for_the_lock_of_their_document():
     assert len(document.session_callbacks) == 1  # the first has been run
     locking.locked(lambda: done.append("no server"))
     assert done[-1] == "no server"
+
+
+def test_what_is_odd_on_a_site_is_told_when_it_is_found(host):
+    from rigdda.app.page.slope_tab import SlopeTab
+
+    tab = SlopeTab(host)
+    tab.show()
+    site = host.project.site
+    host.project.set_value(("road", "end"), site.road.start + 0.6)
+    tab.show()
+    latest = time.monotonic() + 60.0
+    while tab._checks.found is None:
+        assert time.monotonic() < latest
+        time.sleep(0.01)
+    tab.tick()
+    odd = site_check.oddities(host.project.site, ())
+    assert odd
+    assert all(html.escape(line) in tab._findings.object for line in odd)

@@ -40,8 +40,6 @@ NAMES = {
 class BarriersTab:
     """The tab Barriers."""
 
-    title = "Barriers"
-
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.live = page.workspace.live

@@ -47,8 +47,6 @@ SLOW = 5
 class DecideTab:
     """The tab Decide."""
 
-    title = "Decide"
-
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.job = page.workspace.search
@@ -82,6 +80,7 @@ class DecideTab:
         watch(self._only, self._show_found)
         self._points = ColumnDataSource({"x": [], "y": [], "colour": [], "words": [], "place": []})
         self._plot = self._diagram()
+        self._diagrams = pn.Column(sizing_mode="stretch_width")
         self._table = pn.Column(sizing_mode="stretch_width")
         self._prices = pn.Column(width=WIDE, scroll=True, height=610)
         self.panel = pn.Row(
@@ -89,7 +88,7 @@ class DecideTab:
                 pn.Row(self._designer, self._budget, self._verify, self._cost),
                 pn.Row(pn.pane.HTML("Kinds:", width=50, margin=(8, 8)), self._kinds),
                 pn.Row(self._start, self._cancel, self._resume, self._bar),
-                self._status, self._plot, self._only, self._table, sizing_mode="stretch_width",
+                self._status, self._diagrams, self._only, self._table, sizing_mode="stretch_width",
             ),
             self._prices,
             sizing_mode="stretch_width",
@@ -134,7 +133,6 @@ class DecideTab:
             HoverTool(renderers=[found], tooltips=[("", "@words")], description="layouts"),
         )
         plain_axes(plot, self.theme)
-        plot.visible = False
         on_change(self._points.selected, "indices", self._picked)
         return plot
 
@@ -205,7 +203,8 @@ class DecideTab:
         found = sorted(self._found, key=lambda one: (one.stage != VERIFIED, one.objective))
         if self._only.value:
             found = [one for one in found[:60] if self._met(one.layout)]
-        self._plot.visible = bool(found)
+        if bool(found) != bool(len(self._diagrams)):  # without points it has no ranges
+            self._diagrams[:] = [self._plot] if found else []
         self._listed = [one.layout for one in found]
         self._points.data = {
             "x": [one.capital for one in found],

@@ -92,8 +92,6 @@ class Passed:
 class FallsTab:
     """The tab Falls."""
 
-    title = "Falls"
-
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.section = Section(self.theme, "Releases; a click on a path replays it", 330)

@@ -26,8 +26,6 @@ SLOW = 5
 class ReportTab:
     """The tab Report."""
 
-    title = "Report"
-
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.job, self.study = page.workspace.report, page.workspace.study

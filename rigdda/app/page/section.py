@@ -15,7 +15,7 @@ from bokeh.plotting import figure
 from rigdda import BadInput, Layout, Site
 from rigdda.app.page.locking import on_change
 from rigdda.app.page.theme import Theme
-from rigdda.app.reports.pictures import sources
+from rigdda.app.reports.source_outlines import sources
 from rigdda.barriers import Earthwork, earthworks
 from rigdda.model.survey import spikes
 

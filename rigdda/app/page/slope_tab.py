@@ -14,8 +14,8 @@ import panel as pn
 from bokeh.models import HoverTool, PointDrawTool
 
 from rigdda import BadInput, Site
-from rigdda.app import new_site, site_check
 from rigdda.app.page import edits
+from rigdda.app.page.findings import Findings, Found
 from rigdda.app.page.forms import Bound, button, choice, heading, number, text
 from rigdda.app.page.section import HandleSource, Section
 from rigdda.ground.grounds import GROUNDS
@@ -68,8 +68,6 @@ def handles(site: Site) -> list[Handle]:
 class SlopeTab:
     """The tab Slope."""
 
-    title = "Slope"
-
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.section = Section(self.theme, "Section of the slope", coordinates=True)
@@ -79,6 +77,8 @@ class SlopeTab:
         self._places = HandleSource(self._dragged)
         self._points = HandleSource(self._dragged_point)
         self._draw_handles()
+        self._checks = Findings()
+        self._told: Found | None = None
         self._findings = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._forms = pn.Column(width=WIDE, scroll=True, height=610)
         self._import = self._importer()
@@ -108,7 +108,7 @@ class SlopeTab:
         )
         near = site.slope.points if len(site.slope.points) <= MOST else ()
         self._points.show({"x": [p[0] for p in near], "y": [p[1] for p in near]})
-        self._findings.object = self._found(site)
+        self._checks.ask(site, self.project.where.site)
         structure = _structure(site)
         if structure != self._structure:
             self._structure = structure
@@ -117,7 +117,11 @@ class SlopeTab:
             one.refresh()
 
     def tick(self) -> None:
-        """Nothing is computed for this tab in the background."""
+        """Show what was found on the site meanwhile."""
+        found = self._checks.found
+        if found is not None and found is not self._told:
+            self._told = found
+            self._show_found(found)
 
     def _draw_handles(self) -> None:
         plot, theme = self.section.plot, self.theme
@@ -162,17 +166,16 @@ class SlopeTab:
                 return
         self.show()
 
-    def _found(self, site: Site) -> str:
-        """Return what `rigdda check` finds without releases, as a list."""
-        written = site_check.written_events(str(self.project.where.site))
-        odd = site_check.oddities(site, (), written)
-        count = site_check.placeholders(str(self.project.where.site))
+    def _show_found(self, found: Found) -> None:
+        """Show what `rigdda check` finds without releases, as a list."""
+        odd, count = found.odd, found.placeholders
         head = "Nothing looks odd." if not odd else f"{len(odd)} to look at:"
+        head = found.fault or head
         lines = "".join(f"<li>{html.escape(line)}</li>" for line in odd)
         rest = f"<p>The site file marks {count} values as placeholders to replace.</p>"
         command = f"rigdda check {self.project.where.site}"
-        return (
-            f"<h2 style='font-size:15px;margin:8px 0 2px'>{head}</h2>"
+        self._findings.object = (
+            f"<h2 style='font-size:15px;margin:8px 0 2px'>{html.escape(head)}</h2>"
             f"<ul style='margin:2px 0;padding-left:20px'>{lines}</ul>{rest if count else ''}"
             f"<p style='color:{self.theme.quiet}'>The same, with a few releases: "
             f"<code>{html.escape(command)}</code></p>"
@@ -390,6 +393,8 @@ class SlopeTab:
 
     def _import_survey(self, name: str, file: Any, layer: str | None, road: list[Any]) -> None:
         """Make a site of the survey that was chosen, in the place of the present one."""
+        from rigdda.app import new_site
+
         if not file.value:
             raise BadInput("survey", None, "choose a file first")
         ends = (road[0], road[1]) if None not in road else None

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import tomli_w
 
 from rigdda.app.page.jobs import Job
-from rigdda.app.page.live import Live, study_table
+from rigdda.app.page.live import Live
 from rigdda.app.page.state import LAYOUT, Project
 from rigdda.app.page.theme import Theme
 from rigdda.files import atomic
@@ -69,6 +69,8 @@ class Workspace:
         found, project = self.live.figures, self.project
         if found is None or not found.releases or found.layout != project.layout:
             return
+        from rigdda.app.page.figures import study_table
+
         site = os.path.relpath(project.where.site, project.folder)
         table = study_table(site, found.layout, LAYOUT, found.releases)
         text = tomli_w.dumps(table)
@@ -103,8 +105,9 @@ class Host(Protocol):
 class Tab(Protocol):
     """A tab of the page."""
 
-    title: str
     panel: Any
+
+    def __init__(self, page: Host): ...
 
     def show(self) -> None:
         """Show the site and the layout as they are now."""

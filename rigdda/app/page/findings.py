@@ -1,0 +1,59 @@
+"""What `rigdda check` finds on the site of a page without releases, computed by a thread."""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from pathlib import Path
+from typing import NamedTuple
+
+from rigdda import Error, Site
+
+
+class Found(NamedTuple):
+    """What was found on a site."""
+
+    odd: tuple[str, ...]
+    """What looks odd, each in a sentence."""
+    placeholders: int
+    """Number of values of the site file that are marked as placeholders."""
+    fault: str = ""
+    """Why nothing was checked; empty if it was."""
+
+
+class Findings:
+    """Checks of a site that a thread computes, so that the page does not wait for them.
+
+    Attributes
+    ----------
+    found : Found or None
+        What was found on the site that was asked for last; None until it is checked.
+    """
+
+    def __init__(self) -> None:
+        self.found: Found | None = None
+        self._asked: Site | None = None
+        self._lock = threading.Lock()
+
+    def ask(self, site: Site, file: Path) -> None:
+        """Check a site, which is read from a file."""
+        with self._lock:
+            if site is self._asked:
+                return
+            self._asked, self.found = site, None
+        threading.Thread(target=self._work, args=(site, file), name="findings", daemon=True).start()
+
+    def _work(self, site: Site, file: Path) -> None:
+        from rigdda.app import site_check  # imported by the thread: the page opens sooner
+
+        try:
+            odd = site_check.oddities(site, (), site_check.written_events(str(file)))
+            found = Found(tuple(odd), site_check.placeholders(str(file)))
+        except (Error, OSError) as error:
+            found = Found((), 0, str(error))
+        except Exception as error:  # shown on the page
+            traceback.print_exc()
+            found = Found((), 0, f"{type(error).__name__}: {error}")
+        with self._lock:
+            if site is self._asked:
+                self.found = found

@@ -13,7 +13,7 @@ from panel.io.state import set_curdoc  # noqa: E402
 
 from rigdda import sites  # noqa: E402
 from rigdda.app import site_check  # noqa: E402
-from rigdda.app.page import locking  # noqa: E402
+from rigdda.app.page import ground, locking  # noqa: E402
 from rigdda.app.page.falls_tab import BATCH, FallsTab  # noqa: E402
 from rigdda.app.page.state import Project  # noqa: E402
 from rigdda.app.page.theme import LIGHT  # noqa: E402
@@ -98,3 +98,47 @@ def test_what_is_odd_on_a_site_is_told_when_it_is_found(host):
     odd = site_check.oddities(host.project.site, ())
     assert odd
     assert all(html.escape(line) in tab._findings.object for line in odd)
+
+
+def test_ground_shows_observations_and_writes_what_was_fitted(tmp_path):
+    from rigdda.app.page.ground_tab import GroundTab
+
+    (tmp_path / "site.toml").write_text("# kept\n" + sites.text("verge"), encoding="utf-8")
+    observed = tmp_path / "observed"
+    observed.mkdir()
+    runs = [9.8, 12.3, 14.1, 17.2, 20.5]
+    lines = ["event,run_out_m", *(f"block,{x}" for x in runs)]
+    (observed / "runs.csv").write_text("\n".join(lines), encoding="utf-8")
+    (observed / "marks.csv").write_text("impact_m\n3.5\n", encoding="utf-8")
+    with Workspace(Project.open(tmp_path)) as workspace:
+        page = Host(workspace)
+        tab = GroundTab(page)
+        tab.show()
+        assert tab._stops.data["x"] == runs
+        assert tab._marks.data["x"] == [3.5]
+        _wait(lambda: tab.match.found is not None and tab.match.found.releases == 150)
+        tab.tick()
+        assert len(tab._made.data["x"]) == 152
+        assert f"{tab.match.found.score:.3g} metres" in tab._score.object
+        tab._fitted.value = ["surfaces.soil.rolling"]
+        tab._budget.value, tab._releases.value = 8, 10
+        tab._begin()
+        assert tab.job.state == "running"
+        _wait(lambda: tab.job.state != "running")
+        tab._look()
+        assert tab._apply.visible
+        tab._write()
+        (row,) = ground.fit_rows(workspace.fit_folder)
+        text = (tmp_path / "site.toml").read_text(encoding="utf-8")
+        assert text.startswith("# kept")
+        assert page.project.site.surfaces["soil"].rolling == pytest.approx(row.fitted, abs=1e-6)
+        tab.show()
+        page.project.undo()
+        assert page.project.site.surfaces["soil"].rolling == 0.12
+
+
+def _wait(done, seconds=120.0):
+    latest = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < latest
+        time.sleep(0.02)

@@ -179,15 +179,11 @@ class DecideTab:
             f"{done:,} releases, {len(found):,} layouts.</p>{command}"
         )
         self._bar.visible = state == RUNNING
-        most = 1.5 * float(self._option("--budget") or BUDGET)
+        most = 1.5 * float(self.job.option("--budget") or BUDGET)
         self._bar.value = min(99, int(100 * done / most))
         if found != self._found:
             self._found = found
             self._show_found()
-
-    def _option(self, name: str) -> str:
-        known = self.job.arguments
-        return known[known.index(name) + 1] if name in known else ""
 
     def _met(self, layout: Layout) -> bool:
         """Return whether all barriers of a layout meet their checks."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import importlib
+import threading
 from collections.abc import Callable
 from functools import partial
 
@@ -26,7 +27,7 @@ RARELY = 10
 FIRST = 5
 """Number of looks after which the figures of the layout are computed; the page is shown before."""
 
-TABS = ("Slope", "Falls", "Barriers", "Decide", "Report")
+TABS = ("Slope", "Falls", "Ground", "Barriers", "Decide", "Report")
 """Titles of the tabs in the order of use. The tab Slope is `slope_tab.SlopeTab`, and so on."""
 
 
@@ -35,6 +36,12 @@ def tab_class(title: str) -> type[Tab]:
     module = importlib.import_module(f"rigdda.app.page.{title.lower()}_tab")
     found: type[Tab] = getattr(module, f"{title}Tab")
     return found
+
+
+def _import_tabs() -> None:
+    """Import the modules of all tabs."""
+    for title in TABS:
+        tab_class(title)
 
 
 class Page:
@@ -146,6 +153,8 @@ class Page:
                 self._reread.visible = self._keep.visible = True
         if self._seen != self.project.revision:
             self._refresh()
+        if self._count == FIRST:  # the other tabs open sooner, and this one is shown already
+            threading.Thread(target=_import_tabs, name="tabs", daemon=True).start()
         if self._count >= FIRST and self.project.has_site:
             self.workspace.live.ask(self.project.site, self.project.layout)
         self.workspace.write_study()

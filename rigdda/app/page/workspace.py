@@ -35,6 +35,7 @@ class Workspace:
         self.search = Job(project.folder, "search")
         self.study = Job(project.folder, "study")
         self.report = Job(project.folder, "report")
+        self.fit = Job(project.folder, "fit")
         self._study = ""
 
     @property
@@ -61,8 +62,12 @@ class Workspace:
     @property
     def design_folder(self) -> Path | None:
         """The results folder of the last search; None before the first."""
-        known = self.search.arguments
-        return Path(known[known.index("--out") + 1]) if "--out" in known else None
+        return _results(self.search)
+
+    @property
+    def fit_folder(self) -> Path | None:
+        """The results folder of the last fit; None before the first."""
+        return _results(self.fit)
 
     def write_study(self) -> None:
         """Write the study file of the figures that are known, if it has changed."""
@@ -84,8 +89,14 @@ class Workspace:
 
     def __exit__(self, *_: object) -> None:
         self.live.close()
-        for job in (self.search, self.study, self.report):
+        for job in (self.search, self.study, self.report, self.fit):
             job.close()
+
+
+def _results(job: Job) -> Path | None:
+    """Return the results folder of the last command of a job; None before the first."""
+    folder = job.option("--out")
+    return Path(folder) if folder else None
 
 
 class Host(Protocol):

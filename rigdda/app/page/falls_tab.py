@@ -18,7 +18,9 @@ from rigdda.app.page.barriers_tab import shown, ways
 from rigdda.app.page.falls import ENDS, Fall, Release, shares
 from rigdda.app.page.forms import button, heading, in_words, paragraph, table
 from rigdda.app.page.locking import on_change, watch
-from rigdda.app.page.section import Section, plain_axes
+from rigdda.app.page.replays import replay_arguments
+from rigdda.app.page.section import BORDER, Section, plain_axes
+from rigdda.app.page.state import LAYOUT
 from rigdda.app.page.theme import SCALE, SERIES
 from rigdda.app.reports import simulation_report, stations
 from rigdda.app.reports.stations import QUANTITIES, Passing
@@ -29,6 +31,9 @@ if TYPE_CHECKING:
 
 BATCH = 200
 """Number of releases of one press of the button."""
+
+SMALL = 165
+"""Height of a small figure [pixels]."""
 
 WIDE = 430
 """Width of the column of figures [pixels]."""
@@ -94,7 +99,7 @@ class FallsTab:
 
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
-        self.section = Section(self.theme, "Releases; a click on a path replays it", 330)
+        self.section = Section(self.theme, "Releases; a click on a path replays it", 310)
         self._release: Release | None = None
         self._passed: Passed | None = None
         self._shown: Any = None
@@ -128,6 +133,8 @@ class FallsTab:
         )
         self._play = pn.widgets.Toggle(label="Play", width=80, visible=False, margin=(12, 8))
         self._rerun = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
+        self._view = button("Open in rerun", self._open_viewer, visible=False, margin=(12, 8))
+        self._viewed = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._draw()
         for widget in (self._event, self._built):
             watch(widget, self._reset)
@@ -137,11 +144,13 @@ class FallsTab:
         watch(self._time, self._show_block)
         self._put = pn.Row(self._event, self._built, self._by, self._go, self._stop, self._status)
         self.panel = pn.Row(
-            pn.Column(self._put, self._legend, self.section.plot, self._envelopes, self._command,
+            pn.Column(self._put, self._legend, self.section.plot, self._envelopes, self._heights,
+                      self._command,
                       sizing_mode="stretch_width"),
             pn.Column(self._shares, heading("Collector"), pn.Row(self._station, self._what),
                       self._histogram, self._collector, heading("Replay"),
-                      pn.Row(self._time, self._play), self._rerun, self._tracks,
+                      pn.Row(self._time, self._play), self._rerun, self._view, self._viewed,
+                      self._tracks,
                       width=WIDE, scroll=True, height=610),
             sizing_mode="stretch_width",
         )  # fmt: skip
@@ -177,6 +186,8 @@ class FallsTab:
                 self._shown = self._passed
                 self._show_collector()
                 self._show_envelopes()
+        if self._view.visible and self._viewed.object != (now := self._viewing_words()):
+            self._viewed.object = now
         if self._play.value and self._replayed is not None:
             later = self._time.value + 0.1
             self._play.value = later <= self._time.end
@@ -208,6 +219,12 @@ class FallsTab:
         )  # fmt: skip
         self._envelopes.line("x", "energy", source=self._envelope, line_color=SERIES[0],
                              line_width=2)  # fmt: skip
+        self._heights = self._small(
+            "Highest point of 95 % of passing blocks above the ground", "chainage [metres]",
+            "height [metres]", plot.x_range,
+        )  # fmt: skip
+        self._heights.line("x", "height", source=self._envelope, line_color=SERIES[2],
+                           line_width=2)  # fmt: skip
         self._histogram = self._small("Blocks that pass the collector", "value", "blocks", None)
         self._histogram.quad(left="left", right="right", top="top", bottom=0, source=self._bars,
                              fill_color=SERIES[0], line_color=theme.paper)  # fmt: skip
@@ -221,7 +238,8 @@ class FallsTab:
 
     def _small(self, title: str, x: str, y: str, x_range: Any) -> Any:
         """Return a small figure."""
-        plot = figure(height=190, sizing_mode="stretch_width", tools="", title=title,
+        plot = figure(height=SMALL, sizing_mode="stretch_width", tools="", title=title,
+                      min_border_left=BORDER,
                       x_axis_label=x, y_axis_label=y, toolbar_location=None, visible=False,
                       x_range=Range1d(0, 1) if x_range is None else x_range,
                       y_range=Range1d(0, 1))  # fmt: skip
@@ -240,11 +258,12 @@ class FallsTab:
         for source in (self._envelope, self._bars, self._curve, self._block, self._hits,
                        self._track):  # fmt: skip
             source.data = {name: [] for name in source.data}
-        for plot in (self._envelopes, self._histogram, self._tracks):
+        for plot in (self._envelopes, self._heights, self._histogram, self._tracks):
             plot.visible = False
         self._shares.object = self._collector.object = self._rerun.object = ""
         self._status.object = paragraph("Nothing is released yet.")
-        self._time.visible = self._play.visible = False
+        self._time.visible = self._play.visible = self._view.visible = False
+        self._viewed.object = ""
         self._command.object = ""
         if self.project.has_site:
             self.section.show(self.project.site, self._layout)
@@ -377,10 +396,11 @@ class FallsTab:
             "energy": [r["q95"] for r in rows],
             "height": [r["q95"] for r in tall],
         }
-        seen = [r["q95"] for r in rows if np.isfinite(r["q95"])]
-        self._envelopes.visible = bool(seen)
-        if seen:
-            _fit(self._envelopes, None, seen)
+        for plot, found in ((self._envelopes, rows), (self._heights, tall)):
+            seen = [r["q95"] for r in found if np.isfinite(r["q95"])]
+            plot.visible = bool(seen)
+            if seen:
+                _fit(plot, None, seen)
 
     def _show_collector(self) -> None:
         if self._shown is None or self._shown.found is None:
@@ -439,7 +459,7 @@ class FallsTab:
         self.page.act(partial(self._replay, fall))
 
     def _replay(self, fall: Fall) -> None:
-        site, project = self.project.site, self.project
+        site = self.project.site
         self._replayed = fall
         self._hits.data = dict(zip("xy", fall.impacts, strict=True))
         ground = [site.profile.height(x) for x in np.clip(
@@ -452,16 +472,29 @@ class FallsTab:
         self._time.end = fall.duration
         self._time.value = 0.0
         self._time.visible = self._play.visible = True
-        parts = ["rigdda", "replay", str(project.where.site), "--event", fall.event]
-        parts += ["--seed", str(fall.seed)]
-        if self._layout:
-            parts += ["--layout", str(project.folder / "layout.toml")]
+        parts = ["rigdda", *self._replay_arguments(fall)]
         self._rerun.object = (
             f"{paragraph(f'{fall.event}, seed {fall.seed}: {fall.end}')}"
             f"<p style='margin:2px 0;color:{self.theme.quiet}'>To record it for rerun: "
             f"<code>{html.escape(shlex.join(parts))}</code></p>"
         )
+        self._view.visible = True
         self._show_block()
+
+    def _viewing_words(self) -> str:
+        words = self.page.workspace.viewing.look()
+        return paragraph(words) if words else ""
+
+    def _replay_arguments(self, fall: Fall) -> list[str]:
+        layout = self.project.folder / LAYOUT if self._layout else None
+        return replay_arguments(self.project.where.site, layout, fall.event, fall.seed)
+
+    def _open_viewer(self) -> None:
+        """Record the release of the replay and open it in the rerun viewer."""
+        fall, now = self._replayed, self.project.current
+        if fall is not None:
+            asked, texts = self._replay_arguments(fall), f"{now.site}\0{now.layout}"
+            self.page.act(lambda: self.page.workspace.viewing.open(asked, texts))
 
     def _show_block(self) -> None:
         """Draw the block of the replay at the time of the slider."""

@@ -22,6 +22,9 @@ from rigdda.model.survey import spikes
 MARGIN = 0.06
 """Share of the length and the height of the ground that is free around it."""
 
+BORDER = 62
+"""Space left of an axis, so that figures below one another are aligned [pixels]."""
+
 HEIGHT = 400
 """Height of the figure [pixels]."""
 
@@ -70,7 +73,7 @@ class Section:
             height=height, sizing_mode="stretch_width", match_aspect=True,
             tools="pan,wheel_zoom,box_zoom,reset", active_scroll="wheel_zoom", active_drag="pan",
             x_axis_label="chainage [metres]", y_axis_label="elevation [metres]",
-            toolbar_location="right", name=name,
+            toolbar_location="right", name=name, min_border_left=BORDER,
         )  # fmt: skip
         self.plot.toolbar.logo = None
         self.plot.title.text = name

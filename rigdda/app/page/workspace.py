@@ -12,6 +12,7 @@ import tomli_w
 
 from rigdda.app.page.jobs import Job
 from rigdda.app.page.live import Live
+from rigdda.app.page.replays import Viewing
 from rigdda.app.page.state import LAYOUT, Project
 from rigdda.app.page.theme import Theme
 from rigdda.files import atomic
@@ -36,6 +37,7 @@ class Workspace:
         self.study = Job(project.folder, "study")
         self.report = Job(project.folder, "report")
         self.fit = Job(project.folder, "fit")
+        self.viewing = Viewing(project.folder)
         self._study = ""
 
     @property
@@ -89,7 +91,7 @@ class Workspace:
 
     def __exit__(self, *_: object) -> None:
         self.live.close()
-        for job in (self.search, self.study, self.report, self.fit):
+        for job in (self.search, self.study, self.report, self.fit, self.viewing):
             job.close()
 
 

@@ -31,6 +31,13 @@ if TYPE_CHECKING:
 WIDE = 430
 """Width of the column of prices [pixels]."""
 
+TARGETS = {
+    "--target": "At most: P(reaches the road) [-]",
+    "--failure": "At most: P(a barrier fails) [-]",
+    "--target-risk": "At most: individual risk [per year]",
+}
+"""Limits of every design event, and of the individual risk, by the option of the search."""
+
 VERIFIED = "verification"
 """Stage of the evaluations on releases that the search did not use."""
 
@@ -68,6 +75,11 @@ class DecideTab:
         self._cost = pn.widgets.FloatInput(
             label="At most to build [EUR per metre]", value=None, start=0.0, width=190
         )
+        self._targets = {
+            option: pn.widgets.FloatInput(label=words, value=None, start=0.0, end=1.0, step=0.01,
+                                          width=210)
+            for option, words in TARGETS.items()
+        }  # fmt: skip
         self._kinds = pn.widgets.CheckBoxGroup(label="Kinds", options={}, inline=True)
         self._start = button("Start the search", self._begin, primary=True)
         self._cancel = button("Cancel", lambda: self.page.act(self.job.cancel))
@@ -86,6 +98,7 @@ class DecideTab:
         self.panel = pn.Row(
             pn.Column(
                 pn.Row(self._designer, self._budget, self._verify, self._cost),
+                pn.Row(*self._targets.values()),
                 pn.Row(pn.pane.HTML("Kinds:", width=50, margin=(8, 8)), self._kinds),
                 pn.Row(self._start, self._cancel, self._resume, self._bar),
                 self._status, self._diagrams, self._only, self._table, sizing_mode="stretch_width",
@@ -104,6 +117,7 @@ class DecideTab:
         if self._kinds.options != kinds:
             self._kinds.options = kinds
             self._kinds.value = [k for k in kinds.values() if k != "wall"]
+        self._targets["--target-risk"].visible = site.traffic is not None
         if not self._bound:
             self._build()
         for one in self._bound:
@@ -157,6 +171,9 @@ class DecideTab:
         asked += ["--ground-samples", "0"]
         if self._cost.value is not None:
             asked += ["--max-cost", f"{self._cost.value:g}"]
+        for option, one in self._targets.items():
+            if one.value is not None and one.visible:
+                asked += [option, f"{one.value:g}"]
         key = hashlib.sha256("\0".join([self.project.current.site, *asked]).encode()).hexdigest()
         out = self.project.folder / f"design-{key[:8]}"
         assert site.name

@@ -17,6 +17,7 @@ from rigdda import BadInput, Site
 from rigdda.app.page import edits
 from rigdda.app.page.findings import Findings, Found
 from rigdda.app.page.forms import Bound, button, choice, heading, number, text
+from rigdda.app.page.handles import DIGITS, Handle, handles
 from rigdda.app.page.section import HandleSource, Section
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import spikes
@@ -26,43 +27,11 @@ if TYPE_CHECKING:
 
 Path_ = tuple[str | int, ...]
 
-DIGITS = 2
-"""Decimals of chainages and elevations that are dragged [m]."""
-
 MOST = 40
 """Points of the survey up to which each of them can be dragged."""
 
 WIDE = 400
 """Width of the forms [pixels]."""
-
-
-class Handle:
-    """A place on the slope that is dragged along the ground."""
-
-    def __init__(self, words: str, x: float, path: Path_, item: int | None = None):
-        self.words, self.x, self.path, self.item = words, x, path, item
-
-
-def handles(site: Site) -> list[Handle]:
-    """Return what can be dragged on a site: ends of bands, zone, road and grounds, and the toe."""
-    found = []
-    for i, source in enumerate(site.sources):
-        if source.band is not None:
-            for k, end in enumerate(("upper", "lower")):
-                path: Path_ = ("sources", i, "band", k)
-                found.append(Handle(f"{end} end of {source.name}", source.band[k], path))
-    for table, words, place in (
-        ("road", "of the road", site.road),
-        ("barrier_zone", "of the barrier zone", site.barrier_zone),
-    ):
-        found.append(Handle(f"uphill edge {words}", place.start, (table, "start")))
-        found.append(Handle(f"downhill edge {words}", place.end, (table, "end")))
-    found.append(Handle("toe of the slope", site.slope.toe, ("slope", "toe")))
-    for i, stretch in enumerate(site.slope.surfaces):
-        for end in ("start", "end"):
-            path = ("slope", "surfaces", i, end)
-            found.append(Handle(f"{end} of {stretch.surface}", getattr(stretch, end), path))
-    return found
 
 
 class SlopeTab:
@@ -98,11 +67,10 @@ class SlopeTab:
         site = self.project.site
         self.section.show(site)
         self._handles = handles(site)
-        ground = site.profile
         self._places.show(
             {
                 "x": [one.x for one in self._handles],
-                "y": [ground.height(one.x) for one in self._handles],
+                "y": [one.y for one in self._handles],
                 "words": [one.words for one in self._handles],
             }
         )
@@ -147,10 +115,7 @@ class SlopeTab:
         """Move what a handle stands for."""
         for one, x in zip(self._handles, new["x"], strict=False):
             if abs(float(x) - one.x) > 10.0**-DIGITS / 2:
-                value = round(float(x), DIGITS)
-                self.page.act(
-                    partial(self.project.set_value, one.path, value, f"moved the {one.words}")
-                )
+                self._change(one.moved(float(x)), f"moved the {one.words}")
                 return
         self.show()
 

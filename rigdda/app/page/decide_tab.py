@@ -14,7 +14,7 @@ from bokeh.plotting import figure
 from rigdda import BadInput, Layout
 from rigdda.agents.designers import DEFAULT, DESIGNERS
 from rigdda.app.page import placing
-from rigdda.app.page.barriers_tab import NAMES, shown
+from rigdda.app.page.barriers_tab import NAMES, alternatives_html, shown
 from rigdda.app.page.forms import Bound, button, heading, in_words, paragraph, text
 from rigdda.app.page.jobs import CANCELLED, FAILED, INTERRUPTED, RUNNING, Tried, tried
 from rigdda.app.page.live import MOST_BARRIERS
@@ -94,6 +94,8 @@ class DecideTab:
         self._plot = self._diagram()
         self._diagrams = pn.Column(sizing_mode="stretch_width")
         self._table = pn.Column(sizing_mode="stretch_width")
+        self._revision = -1
+        self._compared = pn.pane.HTML("", sizing_mode="stretch_width", margin=(8, 8))
         self._prices = pn.Column(width=WIDE, scroll=True, height=610)
         self.panel = pn.Row(
             pn.Column(
@@ -101,7 +103,8 @@ class DecideTab:
                 pn.Row(*self._targets.values()),
                 pn.Row(pn.pane.HTML("Kinds:", width=50, margin=(8, 8)), self._kinds),
                 pn.Row(self._start, self._cancel, self._resume, self._bar),
-                self._status, self._diagrams, self._only, self._table, sizing_mode="stretch_width",
+                self._status, self._diagrams, self._only, self._table, self._compared,
+                sizing_mode="stretch_width",
             ),
             self._prices,
             sizing_mode="stretch_width",
@@ -123,9 +126,16 @@ class DecideTab:
         for one in self._bound:
             one.refresh()
         self._look()
+        self._revision = -1
 
     def tick(self) -> None:
         """Show what the search has found meanwhile."""
+        live = self.page.workspace.live
+        if self._revision != live.revision and self.project.has_site:
+            self._revision = live.revision
+            compared = alternatives_html(self.project, live)
+            if compared != self._compared.object:
+                self._compared.object = compared
         self._count += 1
         if self._count % SLOW == 0:
             self._look()

@@ -75,7 +75,15 @@ class Passed:
         self.rows: list[dict[str, Any]] = []
         self.slope: list[dict[str, Any]] | None = None
         self.fault = ""
-        threading.Thread(target=self._work, name="collector", daemon=True).start()
+        self._thread = threading.Thread(target=self._work, name="collector", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Do nothing: the passages are computed at once."""
+
+    def join(self) -> None:
+        """Wait until the passages are computed."""
+        self._thread.join()
 
     def _work(self) -> None:
         try:
@@ -281,6 +289,7 @@ class FallsTab:
             return
         if self._release is None:
             self._release = Release(self.project.site, self._layout, self._event.value)
+            self.page.workspace.workers.add(self._release)
         self._release.more(BATCH)
 
     def _end(self) -> None:
@@ -314,6 +323,7 @@ class FallsTab:
             self.project.site, self._layout, self._event.value, release.done,
             float(self._station.value),
         )  # fmt: skip
+        self.page.workspace.workers.add(self._passed)
         self._show_command(release.done)
 
     def _show_command(self, count: int) -> None:

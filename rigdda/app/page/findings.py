@@ -34,6 +34,7 @@ class Findings:
         self.found: Found | None = None
         self._asked: Site | None = None
         self._lock = threading.Lock()
+        self._thread: threading.Thread | None = None
 
     def ask(self, site: Site, file: Path) -> None:
         """Check a site, which is read from a file."""
@@ -41,7 +42,20 @@ class Findings:
             if site is self._asked:
                 return
             self._asked, self.found = site, None
-        threading.Thread(target=self._work, args=(site, file), name="findings", daemon=True).start()
+        self._thread = threading.Thread(
+            target=self._work, args=(site, file), name="findings", daemon=True
+        )
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Forget the site that was asked for last."""
+        with self._lock:
+            self._asked = None
+
+    def join(self) -> None:
+        """Wait until the site is checked."""
+        if self._thread is not None:
+            self._thread.join()
 
     def _work(self, site: Site, file: Path) -> None:
         from rigdda.app import site_check  # imported by the thread: the page opens sooner

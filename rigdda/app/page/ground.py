@@ -166,27 +166,30 @@ class Match:
         self.found: Compared | None = None
         self.fault = ""
         self._generation = 0
+        self._thread: threading.Thread | None = None
         self._lock = threading.Lock()
 
-    def ask(self, site: Site, sets: DataSets) -> threading.Thread | None:
-        """Compare a site from now on; the comparison of another site ends.
-
-        Returns
-        -------
-        Thread or None
-            The thread that compares; None if there are no observations.
-        """
+    def ask(self, site: Site, sets: DataSets) -> None:
+        """Compare a site from now on; the comparison of another site ends."""
         with self._lock:
             self._generation += 1
             self.found, self.fault = None, ""
             generation = self._generation
-        if not sets:
-            return None
-        thread = threading.Thread(
-            target=self._work, args=(site, sets, generation), name="match", daemon=True
-        )
-        thread.start()
-        return thread
+        if sets:
+            self._thread = threading.Thread(
+                target=self._work, args=(site, sets, generation), name="match", daemon=True
+            )
+            self._thread.start()
+
+    def stop(self) -> None:
+        """End after the releases that are being computed."""
+        with self._lock:
+            self._generation += 1
+
+    def join(self) -> None:
+        """Wait until the comparison has ended."""
+        if self._thread is not None:
+            self._thread.join()
 
     def _work(self, site: Site, sets: DataSets, generation: int) -> None:
         fault = ""

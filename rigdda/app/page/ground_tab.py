@@ -65,6 +65,7 @@ class GroundTab:
         self.page, self.project, self.theme = page, page.project, page.theme
         self.job = page.workspace.fit
         self.match = Match()
+        page.workspace.workers.add(self.match)
         self._seen = Observations({}, np.zeros(0), ())
         self._for: Any = None
         self._told: Compared | None = None
@@ -264,6 +265,7 @@ class GroundTab:
             self._release.stop()
         events = [one.event for one in self._seen.sets.values()] or list(site.event_names)
         self._release, self._drawn = Release(site, (), events[0]), 0
+        self.page.workspace.workers.add(self._release)
         self.section.ways.data = {"xs": [], "ys": [], "colour": [], "words": []}
         self._hits.data = {"x": [], "y": []}
         self._release.more(DRAWN)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import threading
 import time
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -28,6 +28,10 @@ NOTHING, CURRENT = "without it", "layout"
 
 ROUNDS = (10, 25, 50, 100, 200, 400, 800, 1600)
 """Numbers of releases of each event after each round."""
+
+COMPARED = 100
+"""Releases of each event of the layout after which the kept alternatives are computed, too, with as
+many releases."""
 
 CHECKED = 50
 """Releases of each event after which the barriers are checked."""
@@ -114,23 +118,34 @@ class Live:
         self._known = _Known()
         self._ready: dict[Layout, LiveFigures] = {}
         self._ready_site: Site | None = None
-        self._asked: tuple[Site, Layout] | None = None
+        self._asked: tuple[Site, Layout, tuple[Layout, ...]] | None = None
         self._generation = 0
         self._wake = threading.Condition()
         self._closed = False
         self._thread = threading.Thread(target=self._work, name="live figures", daemon=True)
         self._thread.start()
 
-    def ask(self, site: Site, layout: Layout) -> None:
-        """Compute the figures of a layout from now on."""
+    def ask(self, site: Site, layout: Layout, others: Sequence[Layout] = ()) -> None:
+        """Compute the figures of a layout from now on, and those of others beside it.
+
+        Parameters
+        ----------
+        site : Site
+            The site.
+        layout : Layout
+            The layout.
+        others : sequence of Layout
+            Layouts to compare, which are computed when there are `COMPARED` releases of `layout`.
+        """
+        asked = site, layout, tuple(others)
         with self._wake:
-            if self._asked == (site, layout):
+            if self._asked == asked:
                 return
-            self._asked, self._generation = (site, layout), self._generation + 1
+            self._asked, self._generation = asked, self._generation + 1
             self._wake.notify_all()
 
     def known(self, site: Site, layout: Layout) -> LiveFigures | None:
-        """Return the figures of a layout that was asked for earlier, if they are remembered."""
+        """Return the figures of a layout that was asked for, if they are remembered."""
         with self._wake:
             return self._ready.get(layout) if self._ready_site == site else None
 
@@ -150,9 +165,9 @@ class Live:
                 if self._closed:
                     return
                 assert self._asked is not None
-                (site, layout), done = self._asked, self._generation
+                (site, layout, others), done = self._asked, self._generation
             try:
-                self._compute(site, layout, done)
+                self._compute(site, layout, others, done)
             except Error as error:
                 self._show(done, LiveFigures(layout, 0, fault=str(error)))
             except Exception as error:  # the thread lives as long as the page
@@ -163,15 +178,22 @@ class Live:
         with self._wake:
             if generation == self._generation:
                 self.figures, self.revision = figures, self.revision + 1
-                if figures.costs is not None and self._asked is not None:
-                    if self._ready_site != self._asked[0]:
-                        self._ready, self._ready_site = {}, self._asked[0]
-                    self._ready[figures.layout] = figures
+                if figures.costs is not None:
+                    self._remember(figures)
+
+    def _remember(self, figures: LiveFigures) -> None:
+        """Remember the figures of a layout on the site that was asked for last."""
+        assert self._asked is not None
+        if self._ready_site != self._asked[0]:
+            self._ready, self._ready_site = {}, self._asked[0]
+        self._ready[figures.layout] = figures
 
     def _left(self, generation: int) -> bool:
         return generation != self._generation
 
-    def _compute(self, site: Site, layout: Layout, generation: int) -> None:
+    def _compute(
+        self, site: Site, layout: Layout, others: Sequence[Layout], generation: int
+    ) -> None:
         """Compute round after round until there is something else to do."""
         from rigdda.app.page import figures
 
@@ -197,9 +219,35 @@ class Live:
                 self._show(generation, shown._replace(doing="checking the barriers"))
                 shown = shown._replace(checks=figures.checked(site, layout))
             self._show(generation, shown)
+            if count == min(COMPARED, self.most):
+                self._compare(site, others, generation, count)
             if self._left(generation):
                 return
         self._show(generation, shown._replace(doing=""))
+
+    def _compare(self, site: Site, others: Sequence[Layout], generation: int, count: int) -> None:
+        """Compute the figures of other layouts, of so many releases of each event."""
+        from rigdda.app.page import figures
+
+        for other in others:
+            known = self.known(site, other)
+            if known is not None and (known.fault or known.releases >= count):
+                continue
+            layouts = figures.study_layouts(other)
+            seen = {name: self._known.of(site, one) for name, one in layouts.items()}
+            found = LiveFigures(other, 0)
+            try:
+                for _ in self._fill(site, layouts, seen, count):
+                    if self._left(generation):
+                        return
+                short = {n: {e: o[:count] for e, o in of.items()} for n, of in seen.items()}
+                found = figures.updated(figures.results_of(site, layouts, short), found, count)
+            except Error as error:
+                found = found._replace(fault=str(error))
+            with self._wake:
+                if generation == self._generation:
+                    self._remember(found._replace(doing=""))
+                    self.revision += 1
 
     def _fill(
         self, site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Outcomes], count: int

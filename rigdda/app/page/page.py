@@ -156,7 +156,8 @@ class Page:
         if self._count == FIRST:  # the other tabs open sooner, and this one is shown already
             threading.Thread(target=_import_tabs, name="tabs", daemon=True).start()
         if self._count >= FIRST and self.project.has_site:
-            self.workspace.live.ask(self.project.site, self.project.layout)
+            others = tuple(self.project.alternatives.values())
+            self.workspace.live.ask(self.project.site, self.project.layout, others)
         self.workspace.write_study()
         self.active.tick()
 

@@ -47,6 +47,7 @@ class SlopeTab:
         self._points = HandleSource(self._dragged_point)
         self._draw_handles()
         self._checks = Findings()
+        page.workspace.workers.add(self._checks)
         self._told: Found | None = None
         self._findings = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._forms = pn.Column(width=WIDE, scroll=True, height=610)

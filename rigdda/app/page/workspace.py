@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,6 +20,16 @@ from rigdda.files import atomic
 
 STUDY = "study.toml"
 """File of the study that computes the figures of the page."""
+
+
+class Worker(Protocol):
+    """What computes for a tab in a thread; the server ends it before it ends itself."""
+
+    def stop(self) -> None:
+        """End after what is being computed."""
+
+    def join(self) -> None:
+        """Wait until nothing is being computed."""
 
 
 class Workspace:
@@ -38,6 +49,7 @@ class Workspace:
         self.report = Job(project.folder, "report")
         self.fit = Job(project.folder, "fit")
         self.viewing = Viewing(project.folder)
+        self.workers: weakref.WeakSet[Worker] = weakref.WeakSet()
         self._study = ""
 
     @property
@@ -91,6 +103,10 @@ class Workspace:
 
     def __exit__(self, *_: object) -> None:
         self.live.close()
+        for worker in (workers := list(self.workers)):
+            worker.stop()
+        for worker in workers:
+            worker.join()
         for job in (self.search, self.study, self.report, self.fit, self.viewing):
             job.close()
 

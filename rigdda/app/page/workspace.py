@@ -60,8 +60,13 @@ class Workspace:
     @property
     def study_arguments(self) -> list[str]:
         """Arguments of the command that computes the figures of the layout."""
-        out = self.project.folder / "study"
-        return ["study", str(self.study_file), "--seed", "0", "--out", str(out)]
+        out = str(self.study_folder)
+        return ["study", str(self.study_file), "--seed", "0", "--out", out]
+
+    @property
+    def study_folder(self) -> Path:
+        """The results folder of the figures of the layout."""
+        return self.project.folder / "study"
 
     @property
     def study_command(self) -> str:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rigdda.app.page.state import Project
     from rigdda.app.page.workspace import Host
 
-DRAWN = 60
+DRAWN = 200
 """Number of releases whose paths are drawn."""
 
 WIDE = 470
@@ -216,10 +216,10 @@ class BarriersTab:
         single = [e.name for e in site.events if e.number == (1, 1) and site.source(e.source).band]
         event = (single or list(site.event_names))[0]
         self._release = Release(site, self.project.layout, event)
-        self.page.workspace.workers.add(self._release)
         self._drawn = 0
         self.section.ways.data = {"xs": [], "ys": [], "colour": [], "words": []}
         self._release.more(DRAWN if single else 3)
+        self.page.workspace.draw_first(self._release)
 
     def _stream(self) -> None:
         if self._release is None or len(self._release.falls) == self._drawn:

@@ -47,7 +47,7 @@ BEST = 8
 BUDGET, VERIFY = 4_000, 500
 """Usual numbers of releases of a search on the page, and of the verification of a layout."""
 
-SLOW = 5
+SLOW = 10
 """Number of looks of the page between two looks at the files of the search."""
 
 

@@ -197,7 +197,7 @@ class FallsTab:
         if self._view.visible and self._viewed.object != (now := self._viewing_words()):
             self._viewed.object = now
         if self._play.value and self._replayed is not None:
-            later = self._time.value + 0.1
+            later = self._time.value + 0.05
             self._play.value = later <= self._time.end
             self._time.value = min(later, self._time.end)
 

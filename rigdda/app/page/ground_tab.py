@@ -39,7 +39,7 @@ DRAWN = 60
 STEPS = 100
 """Number of steps of a slider."""
 
-SLOW = 5
+SLOW = 10
 """Number of looks of the page between two looks at the files of the fit."""
 
 WORDS = {

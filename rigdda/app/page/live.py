@@ -144,6 +144,11 @@ class Live:
             self._asked, self._generation = asked, self._generation + 1
             self._wake.notify_all()
 
+    def rest(self) -> None:
+        """Leave what is being computed until a layout is asked for."""
+        with self._wake:
+            self._asked, self._generation = None, self._generation + 1
+
     def known(self, site: Site, layout: Layout) -> LiveFigures | None:
         """Return the figures of a layout that was asked for, if they are remembered."""
         with self._wake:
@@ -160,7 +165,7 @@ class Live:
         done = 0
         while True:
             with self._wake:
-                while not self._closed and self._generation == done:
+                while not self._closed and (self._generation == done or self._asked is None):
                     self._wake.wait()
                 if self._closed:
                     return

@@ -12,19 +12,19 @@ import panel as pn
 
 from rigdda import BadInput, Error
 from rigdda.app.page.forms import button
-from rigdda.app.page.locking import holding, watch
+from rigdda.app.page.locking import holding, locked, watch
 from rigdda.app.page.state import Conflict
 from rigdda.app.page.theme import Theme
 from rigdda.app.page.workspace import Tab, Workspace
 
-TICK = 100
+TICK = 50
 """Milliseconds between two looks at what has changed."""
 
-RARELY = 10
+RARELY = 20
 """Number of such looks between two looks at the files on disk."""
 
 
-FIRST = 5
+FIRST = 10
 """Number of looks after which the figures of the layout are computed; the page is shown before."""
 
 TABS = ("Slope", "Falls", "Ground", "Barriers", "Decide", "Report")
@@ -139,8 +139,9 @@ class Page:
         self.act(self.project.keep_mine)
 
     def _later(self) -> None:
-        """Show the project at the next tick, which holds the lock of the document."""
+        """Show the project as it is as soon as the lock of the document is held."""
         self._seen = -1
+        locked(self._refresh)
 
     def _tick(self) -> None:
         self._count += 1
@@ -155,7 +156,7 @@ class Page:
             self._refresh()
         if self._count == FIRST:  # the other tabs open sooner, and this one is shown already
             threading.Thread(target=_import_tabs, name="tabs", daemon=True).start()
-        if self._count >= FIRST and self.project.has_site:
+        if self._count >= FIRST and self.project.has_site and not self.workspace.draws:
             others = tuple(self.project.alternatives.values())
             self.workspace.live.ask(self.project.site, self.project.layout, others)
         self.workspace.write_study()

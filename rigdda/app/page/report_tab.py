@@ -28,7 +28,7 @@ WORST = 3
 PAGES = ("report.html", "report.pdf")
 """Files that a report may have."""
 
-SLOW = 5
+SLOW = 10
 """Number of looks of the page between two looks at the report."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import time
 import weakref
 from collections.abc import Callable
 from pathlib import Path
@@ -11,12 +12,16 @@ from typing import Any, Protocol
 
 import tomli_w
 
+from rigdda.app.page.falls import Release
 from rigdda.app.page.jobs import Job
 from rigdda.app.page.live import Live
 from rigdda.app.page.replays import Viewing
 from rigdda.app.page.state import LAYOUT, Project
 from rigdda.app.page.theme import Theme
 from rigdda.files import atomic
+
+AHEAD = 1.0
+"""Longest time for which releases that are drawn go before the figures of the layout [s]."""
 
 STUDY = "study.toml"
 """File of the study that computes the figures of the page."""
@@ -50,7 +55,22 @@ class Workspace:
         self.fit = Job(project.folder, "fit")
         self.viewing = Viewing(project.folder)
         self.workers: weakref.WeakSet[Worker] = weakref.WeakSet()
+        self._first: tuple[Release, float] | None = None
         self._study = ""
+
+    def draw_first(self, release: Release) -> None:
+        """Let the releases that are drawn go before the figures of the layout, for a moment."""
+        self._first = release, time.monotonic() + AHEAD
+        self.workers.add(release)
+        self.live.rest()
+
+    @property
+    def draws(self) -> bool:
+        """Whether releases that are drawn go before the figures of the layout."""
+        if self._first is None:
+            return False
+        release, latest = self._first
+        return release.running and time.monotonic() < latest
 
     @property
     def study_file(self) -> Path:

@@ -20,7 +20,7 @@ from rigdda.app.page.jobs import CANCELLED, FAILED, INTERRUPTED, RUNNING, Tried,
 from rigdda.app.page.live import MOST_BARRIERS
 from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.section import plain_axes
-from rigdda.app.page.theme import SERIES
+from rigdda.app.page.theme import SERIES, WRAPPED
 from rigdda.envs import DesignProblem
 from rigdda.fields import described
 from rigdda.ground.prices import Consequences, Prices
@@ -80,7 +80,9 @@ class DecideTab:
                                           width=210)
             for option, words in TARGETS.items()
         }  # fmt: skip
-        self._kinds = pn.widgets.CheckBoxGroup(label="Kinds", options={}, inline=True)
+        self._kinds = pn.widgets.CheckBoxGroup(
+            label="Kinds", options={}, inline=True, stylesheets=[WRAPPED]
+        )
         self._start = button("Start the search", self._begin, primary=True)
         self._cancel = button("Cancel", lambda: self.page.act(self.job.cancel))
         self._resume = button("Resume", lambda: self.page.act(self.job.resume))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 BATCH = 200
 """Number of releases of one press of the button."""
 
-SMALL = 165
+SMALL = 140
 """Height of a small figure [pixels]."""
 
 WIDE = 430
@@ -107,7 +107,7 @@ class FallsTab:
 
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
-        self.section = Section(self.theme, "Releases; a click on a path replays it", 310)
+        self.section = Section(self.theme, "Releases; a click on a path replays it", 280)
         self._release: Release | None = None
         self._passed: Passed | None = None
         self._shown: Any = None
@@ -222,14 +222,13 @@ class FallsTab:
         on_change(self._line, "data", self._dragged)
         on_change(self.section.ways.selected, "indices", self._picked)
         self._envelopes = self._small(
-            "95 % of passing blocks are below", "chainage [metres]", "energy [kilojoules]",
-            plot.x_range,
+            "95 % of passing blocks are below", "", "energy [kJ]", plot.x_range
         )  # fmt: skip
         self._envelopes.line("x", "energy", source=self._envelope, line_color=SERIES[0],
                              line_width=2)  # fmt: skip
         self._heights = self._small(
             "Highest point of 95 % of passing blocks above the ground", "chainage [metres]",
-            "height [metres]", plot.x_range,
+            "height [m]", plot.x_range,
         )  # fmt: skip
         self._heights.line("x", "height", source=self._envelope, line_color=SERIES[2],
                            line_width=2)  # fmt: skip
@@ -431,7 +430,7 @@ class FallsTab:
         self._histogram.visible = bool(len(values))
         row = next(r for r in self._shown.rows if r["quantity"] == name)
         rows = [
-            (words, shown(row[q]), f"{shown(row[f'{q}_low'])} to {shown(row[f'{q}_high'])}")
+            (words, shown(row[q]), _ends(row[f"{q}_low"], row[f"{q}_high"]))
             for words, q in (("mean", "mean"), ("half are below", "q50"), ("95 % below", "q95"),
                              ("99 % below", "q99"))
         ]  # fmt: skip
@@ -511,6 +510,11 @@ class FallsTab:
         if self._replayed is not None:
             outline = self._replayed.outline(self._time.value)
             self._block.data = {"xs": [outline[:, 0]], "ys": [outline[:, 1]]}
+
+
+def _ends(low: float, high: float) -> str:
+    """Return an interval; empty if there are no values."""
+    return f"{shown(low)} to {shown(high)}" if np.isfinite(low) or np.isfinite(high) else ""
 
 
 def _fit(plot: Any, x: Any, y: Any) -> None:

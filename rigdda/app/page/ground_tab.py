@@ -20,7 +20,7 @@ from rigdda.app.page.ground import Compared, Match, Observations
 from rigdda.app.page.jobs import CANCELLED, FAILED, FINISHED, INTERRUPTED, RUNNING
 from rigdda.app.page.locking import watch
 from rigdda.app.page.section import Section, plain_axes
-from rigdda.app.page.theme import SERIES
+from rigdda.app.page.theme import SERIES, WRAPPED
 from rigdda.app.uncertainty.observations import DEPOSIT, OBSERVED_RUN_OUT
 from rigdda.app.uncertainty.parameters import Parameter
 from rigdda.app.uncertainty.parameters import ground as grounds_of
@@ -74,7 +74,7 @@ class GroundTab:
         self._count = self._drawn = 0
         self._release: Release | None = None
         self._parameters: dict[str, Parameter] = {}
-        self.section = Section(self.theme, "Observed and computed on the section", 300)
+        self.section = Section(self.theme, "Observed and computed on the section", 290)
         self._stops = ColumnDataSource({"x": [], "y": [], "words": []})
         self._marks = ColumnDataSource({"x": [], "y": []})
         self._hits = ColumnDataSource({"x": [], "y": []})
@@ -166,7 +166,9 @@ class GroundTab:
 
     def _build_fit(self) -> None:
         """Build the form that starts the fit."""
-        self._fitted = pn.widgets.CheckBoxGroup(options={}, inline=True)
+        self._fitted = pn.widgets.CheckBoxGroup(
+            options={}, inline=True, sizing_mode="stretch_width", stylesheets=[WRAPPED]
+        )
         self._budget = pn.widgets.IntInput(
             label="Parameter sets", value=ground.BUDGET, start=8, step=8, width=130
         )
@@ -182,7 +184,8 @@ class GroundTab:
         self._apply = button("Write the fitted numbers into the site file", self._write)
         self._fit = [
             heading("Fit"),
-            pn.Row(pn.pane.HTML("Numbers to fit:", width=110, margin=(8, 8)), self._fitted),
+            pn.Row(pn.pane.HTML("Numbers to fit:", width=110, margin=(8, 8)), self._fitted,
+                   sizing_mode="stretch_width"),
             pn.Row(self._budget, self._releases, self._start, self._cancel, self._resume,
                    self._bar),
             self._status, self._apply,

@@ -14,7 +14,7 @@ from rigdda import BadInput, Error
 from rigdda.app.page.forms import button
 from rigdda.app.page.locking import holding, locked, watch
 from rigdda.app.page.state import Conflict
-from rigdda.app.page.theme import Theme
+from rigdda.app.page.theme import Theme, tab_css
 from rigdda.app.page.workspace import Tab, Workspace
 
 TICK = 50
@@ -69,6 +69,7 @@ class Page:
         self._tabs = pn.Tabs(
             *((title, pn.Column(sizing_mode="stretch_width")) for title in TABS),
             sizing_mode="stretch_width",
+            stylesheets=[tab_css(theme)],
         )
         watch(self._tabs, self._refresh, "active")
         other = "light" if theme.name == "dark" else "dark"

@@ -311,9 +311,14 @@ def _number(text: str) -> float:
         return math.nan
 
 
+def releases(study: Study, path: Path) -> list[dict[str, Any]]:
+    """Return the rows of the complete CSV file of a study, one a release."""
+    return _read(path, _fields(study))
+
+
 def results(study: Study, path: Path) -> StudyResults:
     """Return the results of a study from its complete CSV file."""
-    rows, site = _read(path, _fields(study)), study.site
+    rows, site = releases(study, path), study.site
     layouts = []
     for name, layout in study.layouts.items():
         own = [row for row in rows if row["layout"] == name]

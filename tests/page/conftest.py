@@ -52,6 +52,7 @@ class Server:
             self.process.wait(20)
         finally:
             self.kill()
+        assert "Traceback" not in self.log.read_text(), self.log.read_text()
 
 
 @pytest.fixture
@@ -67,7 +68,7 @@ def serve(tmp_path: Path) -> Iterator[object]:
         server.stop()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # its event loop must not outlast the tests of the browser
 def chromium() -> Iterator[object]:
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     program = next(filter(None, map(shutil.which, PROGRAMS)), None)

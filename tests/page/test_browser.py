@@ -46,6 +46,8 @@ SURVEY = """chainage,elevation
 """A profile whose sixth point is a typing error."""
 
 
+TABS = ("Slope", "Falls", "Ground", "Barriers", "Decide", "Report")
+
 HANDLE = """
 words => {
   for (const document of Bokeh.documents)
@@ -168,7 +170,7 @@ def test_a_forbidden_layout_tells_why_and_markup_is_text(serve, tab, project):
     save_layout((), project / "layouts" / "<b>x<b>.toml")
     tab.goto(serve(project).address)
     tab.get_by_role("heading", name=mark).wait_for()
-    for name in ("Slope", "Falls", "Barriers", "Decide", "Report"):
+    for name in TABS:
         _open(tab, name)
         tab.wait_for_timeout(400)
     _open(tab, "Barriers")
@@ -227,6 +229,43 @@ def test_from_a_survey_to_a_search_that_survives_its_server(serve, chromium, tab
     tab.get_by_role("button", name="Cancel").click()
     tab.get_by_text("The search is cancelled").wait_for()
     assert _children(server.process.pid) == []
+
+
+def test_the_first_click_counts_and_the_console_is_quiet(serve, tab, project):
+    said = []
+    tab.on("console", lambda m: said.append(m.text) if m.type in ("warning", "error") else None)
+    tab.on("response", lambda r: said.append(r.url) if r.status >= 400 else None)
+    LIGHT.save(project / "site.toml")
+    tab.goto(serve(project).address)
+    _open(tab, "Falls")
+    tab.get_by_role("button", name="Release 200").click()
+    tab.get_by_text("200 of 200 releases").wait_for()
+    for name in TABS:
+        _open(tab, name)
+        tab.wait_for_timeout(500)
+    tab.get_by_text("What goes into the report").wait_for()
+    assert said == []
+
+
+def test_observations_are_added_and_the_match_follows_a_slider(serve, tab, project):
+    LIGHT.save(project / "site.toml")
+    runs = project.parent / "runs.csv"
+    runs.write_text("event,run_out_m\n" + "".join(f"block,{x}\n" for x in (33.0, 38.0, 41.5)))
+    tab.goto(serve(project).address)
+    _open(tab, "Ground")
+    tab.get_by_text("No observations yet.").wait_for()
+    tab.locator("input[type=file]:visible").set_input_files(runs)
+    tab.wait_for_timeout(500)
+    tab.get_by_role("button", name="Add the observations").click()
+    tab.get_by_text("of 150 releases of each event").wait_for()
+    assert (project / "observed" / "runs.csv").read_text() == runs.read_text()
+    number = tab.locator("input:visible").nth(2)
+    rolling = Site.load(project / "site.toml").surfaces["rock"].rolling
+    number.fill("0.11")
+    number.press("Enter")
+    _wait(lambda: Site.load(project / "site.toml").surfaces["rock"].rolling != rolling)
+    tab.get_by_role("button", name="Undo").click()
+    _wait(lambda: Site.load(project / "site.toml").surfaces["rock"].rolling == rolling)
 
 
 def _children(pid):

@@ -11,7 +11,8 @@ from light_site import LIGHT
 from rigdda import Fence, save_layout
 from rigdda.app.cli import main
 from rigdda.app.page.falls import ENDS, Release, shares
-from rigdda.app.page.live import CURRENT, Live, study_table
+from rigdda.app.page.figures import study_table
+from rigdda.app.page.live import CURRENT, Live
 
 LAYOUT = (Fence(30.0, 4.0, energy_class=1000),)
 
@@ -88,3 +89,14 @@ def test_an_error_of_a_release_is_told():
     release.more(5)
     release.join()
     assert "500" in release.fault
+
+
+def test_alternatives_are_computed_without_being_opened(live):
+    other, impossible = (), (Fence(500.0, 3.0, energy_class=1000),)
+    live.ask(LIGHT, LAYOUT, (other, impossible))
+    _wait(live, lambda found: not found.doing and live.known(LIGHT, impossible) is not None)
+    assert live.known(LIGHT, other).releases == 50
+    for name in ("objective", "harm", "repair", "cost"):
+        assert live.known(LIGHT, other).costs[name] == live.figures.bare[name]
+    assert "500" in live.known(LIGHT, impossible).fault
+    assert live.figures.layout == LAYOUT

@@ -5,7 +5,7 @@ from light_site import LIGHT
 
 from rigdda import BadInput, Ditch, Fence
 from rigdda.app.page import placing
-from rigdda.app.page.live import broken_rules
+from rigdda.app.page.figures import broken_rules
 
 
 @pytest.mark.parametrize("kind", ["fence", "ditch", "embankment", "gravity_wall", "wall"])

@@ -9,6 +9,7 @@ import click
 
 from rigdda.app.terminal import (
     TRAFFIC_HEADING,
+    WholeNumber,
     executor_option,
     finding,
     folder_for,
@@ -27,9 +28,13 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("file", metavar="STUDY.toml")
 @seed_option("Seed of the first release. Later releases use the seeds that follow.")
+@click.option("--worst", "worst", type=WholeNumber(0, 12), default=0, show_default=True,
+              metavar="K", help="Number of worst releases of each layout in worst.csv and "
+              "worst.png: those with the most energy on the road, and those in which a barrier "
+              "fails.")  # fmt: skip
 @out_option("study-NAME")
 @executor_option
-def study(file: str, seed: int, out: Path | None) -> None:
+def study(file: str, seed: int, worst: int, out: Path | None) -> None:
     """Compare the layouts of STUDY.toml on the same releases.
 
     The file gives a `site`, the number of `releases` of each event, and `layouts`. Each layout has
@@ -37,12 +42,12 @@ def study(file: str, seed: int, out: Path | None) -> None:
 
     Writes study.csv (one row for each release), layouts.csv (Z and its parts), events.csv
     (probabilities and energies), differences.csv (of each pair of layouts, on common releases),
-    sections.png, costs.png and, of a site with traffic, risk.csv. An interrupted study continues
-    from study.csv.
+    sections.png, costs.png and, of a site with traffic, risk.csv; with --worst also worst.csv and
+    worst.png. An interrupted study continues from study.csv.
     """
     from dataclasses import replace
 
-    from rigdda.app import studies
+    from rigdda.app import studies, worst_releases
     from rigdda.app.released import released
     from rigdda.app.reports import findings, study_report
 
@@ -54,6 +59,9 @@ def study(file: str, seed: int, out: Path | None) -> None:
         tick(asked.size, "tables and pictures")
         found = studies.results(asked, folder / "study.csv")
         study_report.write(folder, found, seed)
+        if worst:
+            rows = studies.releases(asked, folder / "study.csv")
+            worst_releases.write(folder, asked, rows, worst)
     click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
     show(study_report.costs(found))
     click.echo(

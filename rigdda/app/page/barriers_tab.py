@@ -22,9 +22,11 @@ from rigdda.app.page.theme import SERIES
 from rigdda.barriers.fence import FENCE_CLASSES
 
 if TYPE_CHECKING:
+    from rigdda.app.page.live import Live
+    from rigdda.app.page.state import Project
     from rigdda.app.page.workspace import Host
 
-DRAWN = 60
+DRAWN = 200
 """Number of releases whose paths are drawn."""
 
 WIDE = 470
@@ -39,8 +41,6 @@ NAMES = {
 
 class BarriersTab:
     """The tab Barriers."""
-
-    title = "Barriers"
 
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
@@ -60,8 +60,10 @@ class BarriersTab:
         self._figures = pn.pane.HTML("", width=WIDE - 20, margin=(0, 8))
         self._rules = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._command = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
+        self._kept: list[str] = []
+        self._compared = pn.pane.HTML("", width=WIDE - 30)
         self._alternatives = pn.Column(width=WIDE - 20)
-        self._name = pn.widgets.TextInput(name="Name of an alternative", width=200)
+        self._name = pn.widgets.TextInput(label="Name of an alternative", width=200)
         self.panel = pn.Row(
             pn.Column(
                 self._palette, self.section.plot, self._rules, self._forms, self._command,
@@ -70,7 +72,7 @@ class BarriersTab:
             pn.Column(
                 self._figures, heading("Alternatives"),
                 pn.Row(self._name, button("Keep this layout", self._keep, margin=(18, 8))),
-                self._alternatives, width=WIDE, scroll=True, height=610,
+                self._compared, self._alternatives, width=WIDE, scroll=True, height=610,
             ),
             sizing_mode="stretch_width",
         )  # fmt: skip
@@ -84,7 +86,7 @@ class BarriersTab:
         self.section.show(site, layout)
         self._show_grips()
         kinds = placing.kinds_for(site)
-        if [one.name for one in self._palette] != [f"Add {NAMES[k].lower()}" for k in kinds]:
+        if [one.label for one in self._palette] != [f"Add {NAMES[k].lower()}" for k in kinds]:
             self._palette[:] = [
                 button(f"Add {NAMES[kind].lower()}", partial(self._add, kind)) for kind in kinds
             ]
@@ -108,6 +110,8 @@ class BarriersTab:
             found = self.live.figures
             if found is not None and found.layout == self.project.layout:
                 self._show_figures(found)
+            if self._kept:
+                self._compared.object = alternatives_html(self.project, self.live)
 
     def _draw_handles(self) -> None:
         plot = self.section.plot
@@ -192,7 +196,7 @@ class BarriersTab:
         if field == "energy_class":
             options = {f"{name:,}": name for name in FENCE_CLASSES}
             widget = pn.widgets.Select(
-                name="Energy class [kilojoules]", options=options, width=width, margin=(2, 8)
+                label="Energy class [kilojoules]", options=options, width=width, margin=(2, 8)
             )
             found = Bound(widget, get, write)
         else:
@@ -215,6 +219,7 @@ class BarriersTab:
         self._drawn = 0
         self.section.ways.data = {"xs": [], "ys": [], "colour": [], "words": []}
         self._release.more(DRAWN if single else 3)
+        self.page.workspace.draw_first(self._release)
 
     def _stream(self) -> None:
         if self._release is None or len(self._release.falls) == self._drawn:
@@ -249,22 +254,18 @@ class BarriersTab:
 
     def _show_alternatives(self) -> None:
         found = self.project.alternatives
-        rows, buttons = [], []
-        for name, layout in found.items():
-            known = self.live.known(self.project.site, layout)
-            z = "take it to compute" if known is None or known.costs is None else _z(known)
-            rows.append((name, "; ".join(b.label for b in layout) or "no barrier", z))
-            buttons.append(
-                pn.Row(
-                    pn.pane.HTML(html.escape(name), width=180, margin=(12, 8)),
-                    button("Take", partial(self._take, name), width=80),
-                    button("Drop", partial(self._drop, name), width=80),
-                )
+        self._compared.object = alternatives_html(self.project, self.live)
+        if list(found) == self._kept:
+            return
+        self._kept = list(found)
+        self._alternatives[:] = [
+            pn.Row(
+                pn.pane.HTML(html.escape(name), width=180, margin=(12, 8)),
+                button("Take", partial(self._take, name), width=80),
+                button("Drop", partial(self._drop, name), width=80),
             )
-        head = ("name", "barriers", "Z, unverified")
-        self._alternatives[:] = (
-            [pn.pane.HTML(table(head, rows), width=WIDE - 30), *buttons] if rows else []
-        )
+            for name in found
+        ]
 
     def _take(self, name: str) -> None:
         self.page.act(lambda: self.project.take(name))
@@ -303,11 +304,30 @@ def shown(value: float) -> str:
     return f"{value:,.1f}" if abs(value) >= 100.0 else f"{value:.4g}"
 
 
-def _z(found: LiveFigures) -> str:
-    assert found.costs is not None
+def alternatives_html(project: Project, live: Live) -> str:
+    """Return the table that compares the alternatives of a project; empty without any."""
+    rows = []
+    for name, layout in project.alternatives.items():
+        words = "; ".join(b.label for b in layout) or "no barrier"
+        rows.append((name, words, *_compared(live.known(project.site, layout))))
+    if not rows:
+        return ""
+    head = ("name", "barriers", "Z", "95 % interval", "to build", "most probable reach [%]",
+            "releases")  # fmt: skip
+    caption = "Unverified; Z in EUR per metre of road and year, to build in EUR per metre"
+    return table(head, rows, caption)
+
+
+def _compared(found: LiveFigures | None) -> tuple[str, ...]:
+    """Return the figures of an alternative in the table."""
+    if found is None or found.costs is None:
+        told = "to be computed" if found is None or not found.fault else found.fault
+        return (told, "", "", "", "")
     c = found.costs
-    low, high = shown(c["objective_low"]), shown(c["objective_high"])
-    return f"{shown(c['objective'])} ({low} to {high}), {found.releases:,} releases"
+    reach = max((row["reach"] for row in found.events), default=math.nan)
+    ends = f"{shown(c['objective_low'])} to {shown(c['objective_high'])}"
+    return (shown(c["objective"]), ends, shown(c["cost"]), f"{100 * reach:.2f}",
+            f"{found.releases:,}")  # fmt: skip
 
 
 def figures_html(found: LiveFigures, bad: str, quiet: str) -> str:

@@ -14,12 +14,13 @@ from bokeh.plotting import figure
 from rigdda import BadInput, Layout
 from rigdda.agents.designers import DEFAULT, DESIGNERS
 from rigdda.app.page import placing
-from rigdda.app.page.barriers_tab import NAMES, shown
+from rigdda.app.page.barriers_tab import NAMES, alternatives_html, shown
 from rigdda.app.page.forms import Bound, button, heading, in_words, paragraph, text
 from rigdda.app.page.jobs import CANCELLED, FAILED, INTERRUPTED, RUNNING, Tried, tried
 from rigdda.app.page.live import MOST_BARRIERS
+from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.section import plain_axes
-from rigdda.app.page.theme import SERIES
+from rigdda.app.page.theme import SERIES, WRAPPED
 from rigdda.envs import DesignProblem
 from rigdda.fields import described
 from rigdda.ground.prices import Consequences, Prices
@@ -30,6 +31,13 @@ if TYPE_CHECKING:
 WIDE = 430
 """Width of the column of prices [pixels]."""
 
+TARGETS = {
+    "--target": "At most: P(reaches the road) [-]",
+    "--failure": "At most: P(a barrier fails) [-]",
+    "--target-risk": "At most: individual risk [per year]",
+}
+"""Limits of every design event, and of the individual risk, by the option of the search."""
+
 VERIFIED = "verification"
 """Stage of the evaluations on releases that the search did not use."""
 
@@ -39,14 +47,12 @@ BEST = 8
 BUDGET, VERIFY = 4_000, 500
 """Usual numbers of releases of a search on the page, and of the verification of a layout."""
 
-SLOW = 5
+SLOW = 10
 """Number of looks of the page between two looks at the files of the search."""
 
 
 class DecideTab:
     """The tab Decide."""
-
-    title = "Decide"
 
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
@@ -58,37 +64,49 @@ class DecideTab:
         self._bound: list[Bound] = []
         self._structure: Any = None
         self._designer = pn.widgets.Select(
-            name="Search method", options=list(DESIGNERS), value=DEFAULT, width=130
+            label="Search method", options=list(DESIGNERS), value=DEFAULT, width=130
         )
         self._budget = pn.widgets.IntInput(
-            name="Releases of the search", value=BUDGET, start=2, step=1000, width=150
+            label="Releases of the search", value=BUDGET, start=2, step=1000, width=150
         )
         self._verify = pn.widgets.IntInput(
-            name="Releases to verify each", value=VERIFY, start=10, step=100, width=150
+            label="Releases to verify each", value=VERIFY, start=10, step=100, width=150
         )
         self._cost = pn.widgets.FloatInput(
-            name="At most to build [EUR per metre]", value=None, start=0.0, width=190
+            label="At most to build [EUR per metre]", value=None, start=0.0, width=190
         )
-        self._kinds = pn.widgets.CheckBoxGroup(name="Kinds", options={}, inline=True)
+        self._targets = {
+            option: pn.widgets.FloatInput(label=words, value=None, start=0.0, end=1.0, step=0.01,
+                                          width=210)
+            for option, words in TARGETS.items()
+        }  # fmt: skip
+        self._kinds = pn.widgets.CheckBoxGroup(
+            label="Kinds", options={}, inline=True, stylesheets=[WRAPPED]
+        )
         self._start = button("Start the search", self._begin, primary=True)
         self._cancel = button("Cancel", lambda: self.page.act(self.job.cancel))
         self._resume = button("Resume", lambda: self.page.act(self.job.resume))
         self._bar = pn.indicators.Progress(value=0, max=100, width=300, margin=(14, 8))
         self._status = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._only = pn.widgets.Checkbox(
-            name="Only layouts that meet every check of their barriers", value=False
+            label="Only layouts that meet every check of their barriers", value=False
         )
-        self._only.param.watch(lambda _: self._show_found(), "value")
+        watch(self._only, self._show_found)
         self._points = ColumnDataSource({"x": [], "y": [], "colour": [], "words": [], "place": []})
         self._plot = self._diagram()
+        self._diagrams = pn.Column(sizing_mode="stretch_width")
         self._table = pn.Column(sizing_mode="stretch_width")
+        self._revision = -1
+        self._compared = pn.pane.HTML("", sizing_mode="stretch_width", margin=(8, 8))
         self._prices = pn.Column(width=WIDE, scroll=True, height=610)
         self.panel = pn.Row(
             pn.Column(
                 pn.Row(self._designer, self._budget, self._verify, self._cost),
+                pn.Row(*self._targets.values()),
                 pn.Row(pn.pane.HTML("Kinds:", width=50, margin=(8, 8)), self._kinds),
                 pn.Row(self._start, self._cancel, self._resume, self._bar),
-                self._status, self._plot, self._only, self._table, sizing_mode="stretch_width",
+                self._status, self._diagrams, self._only, self._table, self._compared,
+                sizing_mode="stretch_width",
             ),
             self._prices,
             sizing_mode="stretch_width",
@@ -104,14 +122,22 @@ class DecideTab:
         if self._kinds.options != kinds:
             self._kinds.options = kinds
             self._kinds.value = [k for k in kinds.values() if k != "wall"]
+        self._targets["--target-risk"].visible = site.traffic is not None
         if not self._bound:
             self._build()
         for one in self._bound:
             one.refresh()
         self._look()
+        self._revision = -1
 
     def tick(self) -> None:
         """Show what the search has found meanwhile."""
+        live = self.page.workspace.live
+        if self._revision != live.revision and self.project.has_site:
+            self._revision = live.revision
+            compared = alternatives_html(self.project, live)
+            if compared != self._compared.object:
+                self._compared.object = compared
         self._count += 1
         if self._count % SLOW == 0:
             self._look()
@@ -133,8 +159,7 @@ class DecideTab:
             HoverTool(renderers=[found], tooltips=[("", "@words")], description="layouts"),
         )
         plain_axes(plot, self.theme)
-        plot.visible = False
-        self._points.selected.on_change("indices", self._picked)
+        on_change(self._points.selected, "indices", self._picked)
         return plot
 
     def _begin(self) -> None:
@@ -158,6 +183,9 @@ class DecideTab:
         asked += ["--ground-samples", "0"]
         if self._cost.value is not None:
             asked += ["--max-cost", f"{self._cost.value:g}"]
+        for option, one in self._targets.items():
+            if one.value is not None and one.visible:
+                asked += [option, f"{one.value:g}"]
         key = hashlib.sha256("\0".join([self.project.current.site, *asked]).encode()).hexdigest()
         out = self.project.folder / f"design-{key[:8]}"
         assert site.name
@@ -180,15 +208,11 @@ class DecideTab:
             f"{done:,} releases, {len(found):,} layouts.</p>{command}"
         )
         self._bar.visible = state == RUNNING
-        most = 1.5 * float(self._option("--budget") or BUDGET)
+        most = 1.5 * float(self.job.option("--budget") or BUDGET)
         self._bar.value = min(99, int(100 * done / most))
         if found != self._found:
             self._found = found
             self._show_found()
-
-    def _option(self, name: str) -> str:
-        known = self.job.arguments
-        return known[known.index(name) + 1] if name in known else ""
 
     def _met(self, layout: Layout) -> bool:
         """Return whether all barriers of a layout meet their checks."""
@@ -204,7 +228,8 @@ class DecideTab:
         found = sorted(self._found, key=lambda one: (one.stage != VERIFIED, one.objective))
         if self._only.value:
             found = [one for one in found[:60] if self._met(one.layout)]
-        self._plot.visible = bool(found)
+        if bool(found) != bool(len(self._diagrams)):  # without points it has no ranges
+            self._diagrams[:] = [self._plot] if found else []
         self._listed = [one.layout for one in found]
         self._points.data = {
             "x": [one.capital for one in found],
@@ -226,7 +251,7 @@ class DecideTab:
             )  # fmt: skip
         self._table[:] = rows
 
-    def _picked(self, _: str, __: Any, new: list[int]) -> None:
+    def _picked(self, new: list[int]) -> None:
         if new and new[0] < len(self._listed):
             self._take(self._listed[new[0]])
             self._points.selected.indices = []
@@ -250,7 +275,7 @@ class DecideTab:
                 if isinstance(field.default, float) and field.default > 0.0:
                     path = (table, field.name)
                     widget = pn.widgets.EditableFloatSlider(
-                        name=in_words(field.name, field.unit), start=0.0,
+                        label=in_words(field.name, field.unit), start=0.0,
                         end=3.0 * field.default, step=field.default / 100.0, width=WIDE - 60,
                         margin=(2, 8),
                     )  # fmt: skip

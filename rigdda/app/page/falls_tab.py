@@ -17,7 +17,10 @@ from rigdda import Error
 from rigdda.app.page.barriers_tab import shown, ways
 from rigdda.app.page.falls import ENDS, Fall, Release, shares
 from rigdda.app.page.forms import button, heading, in_words, paragraph, table
-from rigdda.app.page.section import Section, plain_axes
+from rigdda.app.page.locking import on_change, watch
+from rigdda.app.page.replays import replay_arguments
+from rigdda.app.page.section import BORDER, Section, plain_axes
+from rigdda.app.page.state import LAYOUT
 from rigdda.app.page.theme import SCALE, SERIES
 from rigdda.app.reports import simulation_report, stations
 from rigdda.app.reports.stations import QUANTITIES, Passing
@@ -28,6 +31,9 @@ if TYPE_CHECKING:
 
 BATCH = 200
 """Number of releases of one press of the button."""
+
+SMALL = 140
+"""Height of a small figure [pixels]."""
 
 WIDE = 430
 """Width of the column of figures [pixels]."""
@@ -69,7 +75,15 @@ class Passed:
         self.rows: list[dict[str, Any]] = []
         self.slope: list[dict[str, Any]] | None = None
         self.fault = ""
-        threading.Thread(target=self._work, name="collector", daemon=True).start()
+        self._thread = threading.Thread(target=self._work, name="collector", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Do nothing: the passages are computed at once."""
+
+    def join(self) -> None:
+        """Wait until the passages are computed."""
+        self._thread.join()
 
     def _work(self) -> None:
         try:
@@ -91,21 +105,19 @@ class Passed:
 class FallsTab:
     """The tab Falls."""
 
-    title = "Falls"
-
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
-        self.section = Section(self.theme, "Releases; a click on a path replays it", 330)
+        self.section = Section(self.theme, "Releases; a click on a path replays it", 280)
         self._release: Release | None = None
         self._passed: Passed | None = None
         self._shown: Any = None
         self._drawn = 0
         self._for: Any = None
         self._replayed: Fall | None = None
-        self._event = pn.widgets.Select(name="Event", options=[], width=150)
-        self._built = pn.widgets.Checkbox(name="With the layout", value=True, margin=(24, 8))
+        self._event = pn.widgets.Select(label="Event", options=[], width=150)
+        self._built = pn.widgets.Checkbox(label="With the layout", value=True, margin=(24, 8))
         self._by = pn.widgets.Select(
-            name="Colour by", options=[BY_END, BY_EVENT, BY_SPEED, BY_ENERGY], width=150
+            label="Colour by", options=[BY_END, BY_EVENT, BY_SPEED, BY_ENERGY], width=150
         )
         self._go = button(f"Release {BATCH}", self._more, primary=True, margin=(18, 8))
         self._stop = button("Stop", self._end, margin=(18, 8))
@@ -113,9 +125,9 @@ class FallsTab:
         self._legend = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._shares = pn.pane.HTML("", width=WIDE - 20)
         self._collector = pn.pane.HTML("", width=WIDE - 20)
-        self._station = pn.widgets.FloatInput(name="Collector at chainage [metres]", width=190)
+        self._station = pn.widgets.FloatInput(label="Collector at chainage [metres]", width=190)
         labels = {in_words(QUANTITIES[q].words, QUANTITIES[q].unit): q for q in COLLECTED}
-        self._what = pn.widgets.Select(name="Quantity", options=labels, width=190)
+        self._what = pn.widgets.Select(label="Quantity", options=labels, width=190)
         self._command = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._envelope = ColumnDataSource({"x": [], "energy": [], "height": []})
         self._bars = ColumnDataSource({"left": [], "right": [], "top": []})
@@ -125,24 +137,28 @@ class FallsTab:
         self._hits = ColumnDataSource({"x": [], "y": []})
         self._track = ColumnDataSource({"x": [], "energy": [], "height": []})
         self._time = pn.widgets.FloatSlider(
-            name="Time of the replay [seconds]", start=0.0, end=1.0, step=0.02, visible=False
+            label="Time of the replay [seconds]", start=0.0, end=1.0, step=0.02, visible=False
         )
-        self._play = pn.widgets.Toggle(name="Play", width=80, visible=False, margin=(12, 8))
+        self._play = pn.widgets.Toggle(label="Play", width=80, visible=False, margin=(12, 8))
         self._rerun = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
+        self._view = button("Open in rerun", self._open_viewer, visible=False, margin=(12, 8))
+        self._viewed = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._draw()
         for widget in (self._event, self._built):
-            widget.param.watch(lambda _: self._reset(), "value")
-        self._by.param.watch(lambda _: self._recolour(), "value")
-        self._station.param.watch(self._moved, "value")
-        self._what.param.watch(lambda _: self._show_collector(), "value")
-        self._time.param.watch(lambda _: self._show_block(), "value")
+            watch(widget, self._reset)
+        watch(self._by, self._recolour)
+        watch(self._station, self._moved)
+        watch(self._what, self._show_collector)
+        watch(self._time, self._show_block)
         self._put = pn.Row(self._event, self._built, self._by, self._go, self._stop, self._status)
         self.panel = pn.Row(
-            pn.Column(self._put, self._legend, self.section.plot, self._envelopes, self._command,
+            pn.Column(self._put, self._legend, self.section.plot, self._envelopes, self._heights,
+                      self._command,
                       sizing_mode="stretch_width"),
             pn.Column(self._shares, heading("Collector"), pn.Row(self._station, self._what),
                       self._histogram, self._collector, heading("Replay"),
-                      pn.Row(self._time, self._play), self._rerun, self._tracks,
+                      pn.Row(self._time, self._play), self._rerun, self._view, self._viewed,
+                      self._tracks,
                       width=WIDE, scroll=True, height=610),
             sizing_mode="stretch_width",
         )  # fmt: skip
@@ -157,7 +173,7 @@ class FallsTab:
         if self._for == (site, layout):
             return
         self._for = site, layout
-        if self._event.options != site.event_names:
+        if self._event.options != list(site.event_names):
             self._event.options = list(site.event_names)
             self._event.value = site.event_names[0]
         low, high = site.slope.points[0][0], site.slope.points[-1][0]
@@ -178,8 +194,10 @@ class FallsTab:
                 self._shown = self._passed
                 self._show_collector()
                 self._show_envelopes()
+        if self._view.visible and self._viewed.object != (now := self._viewing_words()):
+            self._viewed.object = now
         if self._play.value and self._replayed is not None:
-            later = self._time.value + 0.1
+            later = self._time.value + 0.05
             self._play.value = later <= self._time.end
             self._time.value = min(later, self._time.end)
 
@@ -201,14 +219,19 @@ class FallsTab:
                       description="names of the paths"),
         )  # fmt: skip
         plot.toolbar.active_drag = drag
-        self._line.on_change("data", self._dragged)
-        self.section.ways.selected.on_change("indices", self._picked)
+        on_change(self._line, "data", self._dragged)
+        on_change(self.section.ways.selected, "indices", self._picked)
         self._envelopes = self._small(
-            "95 % of passing blocks are below", "chainage [metres]", "energy [kilojoules]",
-            plot.x_range,
+            "95 % of passing blocks are below", "", "energy [kJ]", plot.x_range
         )  # fmt: skip
         self._envelopes.line("x", "energy", source=self._envelope, line_color=SERIES[0],
                              line_width=2)  # fmt: skip
+        self._heights = self._small(
+            "Highest point of 95 % of passing blocks above the ground", "chainage [metres]",
+            "height [m]", plot.x_range,
+        )  # fmt: skip
+        self._heights.line("x", "height", source=self._envelope, line_color=SERIES[2],
+                           line_width=2)  # fmt: skip
         self._histogram = self._small("Blocks that pass the collector", "value", "blocks", None)
         self._histogram.quad(left="left", right="right", top="top", bottom=0, source=self._bars,
                              fill_color=SERIES[0], line_color=theme.paper)  # fmt: skip
@@ -222,7 +245,8 @@ class FallsTab:
 
     def _small(self, title: str, x: str, y: str, x_range: Any) -> Any:
         """Return a small figure."""
-        plot = figure(height=190, sizing_mode="stretch_width", tools="", title=title,
+        plot = figure(height=SMALL, sizing_mode="stretch_width", tools="", title=title,
+                      min_border_left=BORDER,
                       x_axis_label=x, y_axis_label=y, toolbar_location=None, visible=False,
                       x_range=Range1d(0, 1) if x_range is None else x_range,
                       y_range=Range1d(0, 1))  # fmt: skip
@@ -241,11 +265,12 @@ class FallsTab:
         for source in (self._envelope, self._bars, self._curve, self._block, self._hits,
                        self._track):  # fmt: skip
             source.data = {name: [] for name in source.data}
-        for plot in (self._envelopes, self._histogram, self._tracks):
+        for plot in (self._envelopes, self._heights, self._histogram, self._tracks):
             plot.visible = False
         self._shares.object = self._collector.object = self._rerun.object = ""
         self._status.object = paragraph("Nothing is released yet.")
-        self._time.visible = self._play.visible = False
+        self._time.visible = self._play.visible = self._view.visible = False
+        self._viewed.object = ""
         self._command.object = ""
         if self.project.has_site:
             self.section.show(self.project.site, self._layout)
@@ -258,10 +283,12 @@ class FallsTab:
 
     def _more(self) -> None:
         """Release more rock."""
+        self.show()  # the button may be quicker than the tab
         if not self.project.has_site or not self._event.value:
             return
         if self._release is None:
             self._release = Release(self.project.site, self._layout, self._event.value)
+            self.page.workspace.workers.add(self._release)
         self._release.more(BATCH)
 
     def _end(self) -> None:
@@ -295,6 +322,7 @@ class FallsTab:
             self.project.site, self._layout, self._event.value, release.done,
             float(self._station.value),
         )  # fmt: skip
+        self.page.workspace.workers.add(self._passed)
         self._show_command(release.done)
 
     def _show_command(self, count: int) -> None:
@@ -377,10 +405,11 @@ class FallsTab:
             "energy": [r["q95"] for r in rows],
             "height": [r["q95"] for r in tall],
         }
-        seen = [r["q95"] for r in rows if np.isfinite(r["q95"])]
-        self._envelopes.visible = bool(seen)
-        if seen:
-            _fit(self._envelopes, None, seen)
+        for plot, found in ((self._envelopes, rows), (self._heights, tall)):
+            seen = [r["q95"] for r in found if np.isfinite(r["q95"])]
+            plot.visible = bool(seen)
+            if seen:
+                _fit(plot, None, seen)
 
     def _show_collector(self) -> None:
         if self._shown is None or self._shown.found is None:
@@ -401,7 +430,7 @@ class FallsTab:
         self._histogram.visible = bool(len(values))
         row = next(r for r in self._shown.rows if r["quantity"] == name)
         rows = [
-            (words, shown(row[q]), f"{shown(row[f'{q}_low'])} to {shown(row[f'{q}_high'])}")
+            (words, shown(row[q]), _ends(row[f"{q}_low"], row[f"{q}_high"]))
             for words, q in (("mean", "mean"), ("half are below", "q50"), ("95 % below", "q95"),
                              ("99 % below", "q99"))
         ]  # fmt: skip
@@ -420,18 +449,18 @@ class FallsTab:
         self._line_x = x
         self._line.data = {"x": [x, x], "y": [y, y + tall], "words": ["collector"] * 2}
 
-    def _dragged(self, _: str, __: Any, new: Any) -> None:
+    def _dragged(self, new: Any) -> None:
         moved = [float(x) for x in new["x"] if abs(float(x) - self._line_x) > 1e-6]
         if moved:
             self._station.value = round(moved[0], 1)
             self._show_line()
 
-    def _moved(self, _: Any) -> None:
+    def _moved(self) -> None:
         if self.project.has_site and self._station.value is not None:
             self._show_line()
             self._collect()
 
-    def _picked(self, _: str, __: Any, new: list[int]) -> None:
+    def _picked(self, new: list[int]) -> None:
         """Replay the release whose path was clicked."""
         if not new or self._release is None or new[0] >= len(self._release.falls):
             return
@@ -439,7 +468,7 @@ class FallsTab:
         self.page.act(partial(self._replay, fall))
 
     def _replay(self, fall: Fall) -> None:
-        site, project = self.project.site, self.project
+        site = self.project.site
         self._replayed = fall
         self._hits.data = dict(zip("xy", fall.impacts, strict=True))
         ground = [site.profile.height(x) for x in np.clip(
@@ -452,22 +481,40 @@ class FallsTab:
         self._time.end = fall.duration
         self._time.value = 0.0
         self._time.visible = self._play.visible = True
-        parts = ["rigdda", "replay", str(project.where.site), "--event", fall.event]
-        parts += ["--seed", str(fall.seed)]
-        if self._layout:
-            parts += ["--layout", str(project.folder / "layout.toml")]
+        parts = ["rigdda", *self._replay_arguments(fall)]
         self._rerun.object = (
             f"{paragraph(f'{fall.event}, seed {fall.seed}: {fall.end}')}"
             f"<p style='margin:2px 0;color:{self.theme.quiet}'>To record it for rerun: "
             f"<code>{html.escape(shlex.join(parts))}</code></p>"
         )
+        self._view.visible = True
         self._show_block()
+
+    def _viewing_words(self) -> str:
+        words = self.page.workspace.viewing.look()
+        return paragraph(words) if words else ""
+
+    def _replay_arguments(self, fall: Fall) -> list[str]:
+        layout = self.project.folder / LAYOUT if self._layout else None
+        return replay_arguments(self.project.where.site, layout, fall.event, fall.seed)
+
+    def _open_viewer(self) -> None:
+        """Record the release of the replay and open it in the rerun viewer."""
+        fall, now = self._replayed, self.project.current
+        if fall is not None:
+            asked, texts = self._replay_arguments(fall), f"{now.site}\0{now.layout}"
+            self.page.act(lambda: self.page.workspace.viewing.open(asked, texts))
 
     def _show_block(self) -> None:
         """Draw the block of the replay at the time of the slider."""
         if self._replayed is not None:
             outline = self._replayed.outline(self._time.value)
             self._block.data = {"xs": [outline[:, 0]], "ys": [outline[:, 1]]}
+
+
+def _ends(low: float, high: float) -> str:
+    """Return an interval; empty if there are no values."""
+    return f"{shown(low)} to {shown(high)}" if np.isfinite(low) or np.isfinite(high) else ""
 
 
 def _fit(plot: Any, x: Any, y: Any) -> None:

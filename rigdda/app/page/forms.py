@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import panel as pn
+
+from rigdda.app.page.locking import locked
 
 UNITS = {
     "m": "metres", "m2": "square metres", "m3": "cubic metres", "deg": "degrees",
@@ -103,8 +106,11 @@ class Bound:
 
     def _changed(self, event: Any) -> None:
         if not self._showing and event.new is not None and event.new != self._get():
-            self._write(event.new)
-            self.refresh()
+            locked(partial(self._enter, event.new))
+
+    def _enter(self, value: Any) -> None:
+        self._write(value)
+        self.refresh()
 
 
 def number(
@@ -116,7 +122,7 @@ def number(
     **limits: Any,
 ) -> Bound:
     """Return an input for a number."""
-    widget = pn.widgets.FloatInput(name=label, step=step, width=width, margin=(2, 8), **limits)
+    widget = pn.widgets.FloatInput(label=label, step=step, width=width, margin=(2, 8), **limits)
     return Bound(widget, get, write)
 
 
@@ -128,13 +134,13 @@ def choice(
     width: int = 150,
 ) -> Bound:
     """Return a choice of one of several options."""
-    widget = pn.widgets.Select(name=label, options=options, width=width, margin=(2, 8))
+    widget = pn.widgets.Select(label=label, options=options, width=width, margin=(2, 8))
     return Bound(widget, get, write)
 
 
 def button(label: str, do: Callable[[], object], primary: bool = False, **more: Any) -> Any:
     """Return a button."""
     kind = "primary" if primary else "default"
-    found = pn.widgets.Button(name=label, button_type=kind, **({"margin": (4, 8)} | more))
-    found.on_click(lambda _: do())
+    found = pn.widgets.Button(label=label, color=kind, **({"margin": (4, 8)} | more))
+    found.on_click(lambda _: locked(do))
     return found

@@ -66,6 +66,11 @@ class Job:
         """The command as a user would type it; empty if there has been none."""
         return shlex.join(["rigdda", *self.arguments]) if self.arguments else ""
 
+    def option(self, name: str) -> str:
+        """Return the value of an option of the command; empty if it has none of that name."""
+        known = self.arguments
+        return known[known.index(name) + 1] if name in known else ""
+
     @property
     def words(self) -> str:
         """Why the command failed; empty if it did not."""

@@ -2,7 +2,8 @@
 
 A thread computes releases of the layout on the page, and of the slope without it, in rounds of more
 and more releases of each event. The figures are those of a study (`rigdda study`) of the same
-releases. When the layout or the site changes, the thread leaves what it does and begins anew.
+releases. When the layout or the site changes, the thread leaves what it does and begins anew. It
+imports `figures` and the problem of design, so that the page opens sooner.
 """
 
 from __future__ import annotations
@@ -10,29 +11,27 @@ from __future__ import annotations
 import threading
 import time
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
-import numpy as np
 
 import rigdda
 from rigdda import BadInput, Error, Layout, Outcome, Site
-from rigdda.app.barrier_checks import LayoutChecks, check_layout
-from rigdda.app.page.placing import kinds_for
-from rigdda.app.reports import study_report
-from rigdda.app.reports.study_report import StudiedLayout, StudyResults
-from rigdda.barriers import KINDS
-from rigdda.envs import DesignProblem
-from rigdda.envs.cost import Account, account, learn
-from rigdda.envs.outcome_cache import release_key
+
+if TYPE_CHECKING:
+    from rigdda.app.barrier_checks import LayoutChecks
 
 NOTHING, CURRENT = "without it", "layout"
 """Names of the two layouts of a study of the page."""
 
 ROUNDS = (10, 25, 50, 100, 200, 400, 800, 1600)
 """Numbers of releases of each event after each round."""
+
+COMPARED = 100
+"""Releases of each event of the layout after which the kept alternatives are computed, too, with as
+many releases."""
 
 CHECKED = 50
 """Releases of each event after which the barriers are checked."""
@@ -49,82 +48,6 @@ MOST_BARRIERS = 8
 
 Outcomes = dict[str, list[Outcome]]
 """Outcomes of the releases with seeds 0, 1, 2, ... of each event."""
-
-
-def study_layouts(layout: Layout) -> dict[str, Layout]:
-    """Return the layouts of the study of a page: the slope without the layout, and the layout."""
-    return {NOTHING: (), CURRENT: layout} if layout else {NOTHING: ()}
-
-
-def study_table(site: str, layout: Layout, file: str, releases: int) -> dict[str, Any]:
-    """Return the content of a study file that computes the figures of the page.
-
-    Parameters
-    ----------
-    site, file : str
-        The site file and the layout file, as seen from the folder of the study file.
-    layout : Layout
-        The layout.
-    releases : int
-        Number of releases of each event.
-    """
-    tables: list[dict[str, Any]] = [{"name": NOTHING}]
-    if layout:
-        tables.append({"name": CURRENT, "file": file})
-    return {"site": site, "releases": releases, "layouts": tables}
-
-
-def results_of(site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Outcomes]) -> Any:
-    """Return the results of a study from the outcomes of its releases.
-
-    Parameters
-    ----------
-    site : Site
-        The site.
-    layouts : dict of str to Layout
-        The layouts of the study by name.
-    seen : dict of str to dict of str to list of Outcome
-        For each layout the outcomes of each event, as many of each.
-
-    Returns
-    -------
-    StudyResults
-        The results, equal to those of `rigdda study` on the same releases.
-    """
-    flat = {n: [o for event in site.event_names for o in seen[n][event]] for n in layouts}
-    accounts = {name: account(site, layouts[name], flat[name]) for name in layouts}
-    studied = tuple(
-        StudiedLayout(
-            name,
-            layouts[name],
-            accounts[name],
-            np.array([1e-3 * outcome.max_energy_on_road for outcome in flat[name]]),
-            np.array([1e-3 * max((b.max_energy for b in o.barriers), default=0.0)
-                      for o in flat[name]]),
-        )
-        for name in layouts
-    )  # fmt: skip
-    together = _joined(list(accounts.values()))
-    outcomes = [outcome for name in layouts for outcome in flat[name]]
-    released = np.array([outcome.released_volume for outcome in outcomes])
-    widths = np.array([outcome.width for outcome in outcomes])
-    facts = {}
-    for event in site.event_names:
-        own = together.event == event
-        facts[event] = learn(site, together.of(own), released[own], widths[own], 1.0)
-    return StudyResults(site, studied, facts)
-
-
-def _joined(parts: list[Account]) -> Account:
-    """Return the account of several accounts one after another."""
-    tolls = [part.toll for part in parts if part.toll is not None]
-
-    def column(name: str) -> Any:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    names = ("event", "harm", "repair", "volume", "reached", "failed")
-    toll = np.concatenate(tolls) if tolls else None
-    return Account(**{name: column(name) for name in names}, toll=toll)
 
 
 class LiveFigures(NamedTuple):
@@ -150,13 +73,6 @@ class LiveFigures(NamedTuple):
     """What is being computed; empty if nothing is."""
 
 
-def broken_rules(site: Site, layout: Layout) -> tuple[str, ...]:
-    """Return the siting rules that a layout breaks, each with its reason."""
-    problem = DesignProblem(site, max_barriers=MOST_BARRIERS)
-    found = problem.place.violations(layout, tuple(KINDS), MOST_BARRIERS)
-    return tuple(dict.fromkeys(map(str, found)))
-
-
 @dataclass
 class _Known:
     """The outcomes of a site that have been computed, by layout; the oldest are forgotten."""
@@ -165,6 +81,8 @@ class _Known:
     outcomes: dict[Layout, Outcomes] = field(default_factory=dict)
 
     def of(self, site: Site, layout: Layout) -> Outcomes:
+        from rigdda.envs.outcome_cache import release_key
+
         key = release_key(site) + msgspec.json.encode(site.existing)
         if key != self.key:
             self.key, self.outcomes = key, {}
@@ -200,23 +118,39 @@ class Live:
         self._known = _Known()
         self._ready: dict[Layout, LiveFigures] = {}
         self._ready_site: Site | None = None
-        self._asked: tuple[Site, Layout] | None = None
+        self._asked: tuple[Site, Layout, tuple[Layout, ...]] | None = None
         self._generation = 0
         self._wake = threading.Condition()
         self._closed = False
         self._thread = threading.Thread(target=self._work, name="live figures", daemon=True)
         self._thread.start()
 
-    def ask(self, site: Site, layout: Layout) -> None:
-        """Compute the figures of a layout from now on."""
+    def ask(self, site: Site, layout: Layout, others: Sequence[Layout] = ()) -> None:
+        """Compute the figures of a layout from now on, and those of others beside it.
+
+        Parameters
+        ----------
+        site : Site
+            The site.
+        layout : Layout
+            The layout.
+        others : sequence of Layout
+            Layouts to compare, which are computed when there are `COMPARED` releases of `layout`.
+        """
+        asked = site, layout, tuple(others)
         with self._wake:
-            if self._asked == (site, layout):
+            if self._asked == asked:
                 return
-            self._asked, self._generation = (site, layout), self._generation + 1
+            self._asked, self._generation = asked, self._generation + 1
             self._wake.notify_all()
 
+    def rest(self) -> None:
+        """Leave what is being computed until a layout is asked for."""
+        with self._wake:
+            self._asked, self._generation = None, self._generation + 1
+
     def known(self, site: Site, layout: Layout) -> LiveFigures | None:
-        """Return the figures of a layout that was asked for earlier, if they are remembered."""
+        """Return the figures of a layout that was asked for, if they are remembered."""
         with self._wake:
             return self._ready.get(layout) if self._ready_site == site else None
 
@@ -231,14 +165,14 @@ class Live:
         done = 0
         while True:
             with self._wake:
-                while not self._closed and self._generation == done:
+                while not self._closed and (self._generation == done or self._asked is None):
                     self._wake.wait()
                 if self._closed:
                     return
                 assert self._asked is not None
-                (site, layout), done = self._asked, self._generation
+                (site, layout, others), done = self._asked, self._generation
             try:
-                self._compute(site, layout, done)
+                self._compute(site, layout, others, done)
             except Error as error:
                 self._show(done, LiveFigures(layout, 0, fault=str(error)))
             except Exception as error:  # the thread lives as long as the page
@@ -249,17 +183,26 @@ class Live:
         with self._wake:
             if generation == self._generation:
                 self.figures, self.revision = figures, self.revision + 1
-                if figures.costs is not None and self._asked is not None:
-                    if self._ready_site != self._asked[0]:
-                        self._ready, self._ready_site = {}, self._asked[0]
-                    self._ready[figures.layout] = figures
+                if figures.costs is not None:
+                    self._remember(figures)
+
+    def _remember(self, figures: LiveFigures) -> None:
+        """Remember the figures of a layout on the site that was asked for last."""
+        assert self._asked is not None
+        if self._ready_site != self._asked[0]:
+            self._ready, self._ready_site = {}, self._asked[0]
+        self._ready[figures.layout] = figures
 
     def _left(self, generation: int) -> bool:
         return generation != self._generation
 
-    def _compute(self, site: Site, layout: Layout, generation: int) -> None:
+    def _compute(
+        self, site: Site, layout: Layout, others: Sequence[Layout], generation: int
+    ) -> None:
         """Compute round after round until there is something else to do."""
-        broken = broken_rules(site, layout)
+        from rigdda.app.page import figures
+
+        broken = figures.broken_rules(site, layout)
         shown = LiveFigures(layout, 0, broken=broken, doing="starting")
         self._show(generation, shown)
         try:
@@ -268,7 +211,7 @@ class Live:
         except BadInput as bad:
             self._show(generation, shown._replace(fault=str(bad), doing=""))
             return
-        layouts = study_layouts(layout)
+        layouts = figures.study_layouts(layout)
         for count in (n for n in ROUNDS if n <= self.most):
             seen = {name: self._known.of(site, one) for name, one in layouts.items()}
             for words in self._fill(site, layouts, seen, count):
@@ -276,19 +219,40 @@ class Live:
                     return
                 self._show(generation, shown._replace(doing=words))
             short = {n: {e: o[:count] for e, o in of.items()} for n, of in seen.items()}
-            shown = _figures(results_of(site, layouts, short), shown, count)
+            shown = figures.updated(figures.results_of(site, layouts, short), shown, count)
             if count >= CHECKED and shown.checks is None and not broken and layout:
                 self._show(generation, shown._replace(doing="checking the barriers"))
-                shown = shown._replace(checks=self._checked(site, layout))
+                shown = shown._replace(checks=figures.checked(site, layout))
             self._show(generation, shown)
+            if count == min(COMPARED, self.most):
+                self._compare(site, others, generation, count)
             if self._left(generation):
                 return
         self._show(generation, shown._replace(doing=""))
 
-    @staticmethod
-    def _checked(site: Site, layout: Layout) -> LayoutChecks:
-        problem = DesignProblem(site, max_barriers=MOST_BARRIERS, kinds=kinds_for(site))
-        return check_layout(problem, layout)
+    def _compare(self, site: Site, others: Sequence[Layout], generation: int, count: int) -> None:
+        """Compute the figures of other layouts, of so many releases of each event."""
+        from rigdda.app.page import figures
+
+        for other in others:
+            known = self.known(site, other)
+            if known is not None and (known.fault or known.releases >= count):
+                continue
+            layouts = figures.study_layouts(other)
+            seen = {name: self._known.of(site, one) for name, one in layouts.items()}
+            found = LiveFigures(other, 0)
+            try:
+                for _ in self._fill(site, layouts, seen, count):
+                    if self._left(generation):
+                        return
+                short = {n: {e: o[:count] for e, o in of.items()} for n, of in seen.items()}
+                found = figures.updated(figures.results_of(site, layouts, short), found, count)
+            except Error as error:
+                found = found._replace(fault=str(error))
+            with self._wake:
+                if generation == self._generation:
+                    self._remember(found._replace(doing=""))
+                    self.revision += 1
 
     def _fill(
         self, site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Outcomes], count: int
@@ -309,18 +273,3 @@ class Live:
                     quick = time.monotonic() - start < PATIENCE
                     step = 2 * step if quick else max(1, step // 2)
                     yield f"{event}: {len(own):,} of {count:,} releases"
-
-
-def _figures(results: StudyResults, before: LiveFigures, count: int) -> LiveFigures:
-    """Return the figures of the results of a study."""
-    rows = study_report.layout_rows(results)
-    name = rows[-1]["layout"]
-    risk = results.risk(results.layouts[-1])
-    return before._replace(
-        releases=count,
-        costs=rows[-1],
-        bare=rows[0],
-        events=tuple(r for r in study_report.event_rows(results) if r["layout"] == name),
-        individual=None if risk is None else (risk.individual.value, *risk.individual.interval),
-        doing="more releases",
-    )

@@ -3,30 +3,45 @@
 from __future__ import annotations
 
 import html
+import importlib
+import threading
 from collections.abc import Callable
+from functools import partial
 
 import panel as pn
 
 from rigdda import BadInput, Error
-from rigdda.app.page.barriers_tab import BarriersTab
-from rigdda.app.page.decide_tab import DecideTab
-from rigdda.app.page.falls_tab import FallsTab
 from rigdda.app.page.forms import button
-from rigdda.app.page.report_tab import ReportTab
-from rigdda.app.page.slope_tab import SlopeTab
+from rigdda.app.page.locking import holding, locked, watch
 from rigdda.app.page.state import Conflict
-from rigdda.app.page.theme import Theme
+from rigdda.app.page.theme import Theme, tab_css
 from rigdda.app.page.workspace import Tab, Workspace
 
-TICK = 100
+TICK = 50
 """Milliseconds between two looks at what has changed."""
 
-RARELY = 10
+RARELY = 20
 """Number of such looks between two looks at the files on disk."""
 
 
-TABS = (SlopeTab, FallsTab, BarriersTab, DecideTab, ReportTab)
-"""The tabs in the order of use."""
+FIRST = 10
+"""Number of looks after which the figures of the layout are computed; the page is shown before."""
+
+TABS = ("Slope", "Falls", "Ground", "Barriers", "Decide", "Report")
+"""Titles of the tabs in the order of use. The tab Slope is `slope_tab.SlopeTab`, and so on."""
+
+
+def tab_class(title: str) -> type[Tab]:
+    """Return the class of a tab; its module is imported when it is first needed."""
+    module = importlib.import_module(f"rigdda.app.page.{title.lower()}_tab")
+    found: type[Tab] = getattr(module, f"{title}Tab")
+    return found
+
+
+def _import_tabs() -> None:
+    """Import the modules of all tabs."""
+    for title in TABS:
+        tab_class(title)
 
 
 class Page:
@@ -50,11 +65,13 @@ class Page:
         self._redo = button("Redo", lambda: self.act(self.project.redo), width=90)
         self._reread = button("Read the file again", self._read_again, visible=False)
         self._keep = button("Keep what the page shows", self._keep_mine, visible=False)
-        self.tabs: list[Tab] = [kind(self) for kind in TABS]
+        self._built: dict[str, Tab] = {}
         self._tabs = pn.Tabs(
-            *((tab.title, tab.panel) for tab in self.tabs), sizing_mode="stretch_width"
+            *((title, pn.Column(sizing_mode="stretch_width")) for title in TABS),
+            sizing_mode="stretch_width",
+            stylesheets=[tab_css(theme)],
         )
-        self._tabs.param.watch(lambda _: self._later(), "active")
+        watch(self._tabs, self._refresh, "active")
         other = "light" if theme.name == "dark" else "dark"
         link = pn.pane.HTML(
             f"<a href='?theme={other}' style='color:{theme.accent}'>{other} colours</a>",
@@ -71,12 +88,15 @@ class Page:
         if document is None:  # in a notebook
             pn.state.add_periodic_callback(self._tick, TICK)
         else:  # Bokeh locks the document while its own callbacks run
-            document.add_periodic_callback(self._tick, TICK)
+            document.add_periodic_callback(partial(holding, self._tick), TICK)
 
     @property
     def active(self) -> Tab:
-        """The tab that is shown."""
-        return self.tabs[self._tabs.active]
+        """The tab that is shown; it is built when it is first shown."""
+        title = TABS[self._tabs.active]
+        if title not in self._built:
+            self._built[title] = tab_class(title)(self)
+        return self._built[title]
 
     def act(self, do: Callable[[], object]) -> bool:
         """Do something to the project, show its error if there is one, and what has changed.
@@ -120,8 +140,9 @@ class Page:
         self.act(self.project.keep_mine)
 
     def _later(self) -> None:
-        """Show the project at the next tick, which holds the lock of the document."""
+        """Show the project as it is as soon as the lock of the document is held."""
         self._seen = -1
+        locked(self._refresh)
 
     def _tick(self) -> None:
         self._count += 1
@@ -134,6 +155,11 @@ class Page:
                 self._reread.visible = self._keep.visible = True
         if self._seen != self.project.revision:
             self._refresh()
+        if self._count == FIRST:  # the other tabs open sooner, and this one is shown already
+            threading.Thread(target=_import_tabs, name="tabs", daemon=True).start()
+        if self._count >= FIRST and self.project.has_site and not self.workspace.draws:
+            others = tuple(self.project.alternatives.values())
+            self.workspace.live.ask(self.project.site, self.project.layout, others)
         self.workspace.write_study()
         self.active.tick()
 
@@ -151,6 +177,8 @@ class Page:
         self._undo.disabled, self._redo.disabled = not project.undoes, not project.redoes
         self._undo.description = f"Undo: {project.undoes}" if project.undoes else None
         self._redo.description = f"Redo: {project.redoes}" if project.redoes else None
-        if project.has_site:
-            self.workspace.live.ask(project.site, project.layout)
-        self.active.show()
+        tab = self.active
+        tab.show()
+        place = self._tabs[self._tabs.active]
+        if not len(place):  # drawn with its data
+            place.append(tab.panel)

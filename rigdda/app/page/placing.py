@@ -158,11 +158,11 @@ def dragged(site: Site, layout: Layout, grip: Grip, x: float, y: float) -> Layou
         case "x":
             value = x
         case "width":
-            value = max(STEP, barrier.width + x - grip.x)  # type: ignore[attr-defined]
+            value = max(STEP, getattr(barrier, grip.field) + x - grip.x)
         case "depth":
-            value = max(STEP, barrier.depth + grip.y - y)  # type: ignore[attr-defined]
+            value = max(STEP, getattr(barrier, grip.field) + grip.y - y)
         case _:
-            value = max(STEP, barrier.height + y - grip.y)  # type: ignore[attr-defined]
+            value = max(STEP, getattr(barrier, grip.field) + y - grip.y)
     value = round(round(value / STEP) * STEP, 6)
     if isinstance(barrier, Fence) and grip.field == "height" and barrier.energy_class is not None:
         row = FENCE_CLASSES[barrier.energy_class]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import html
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,28 +14,39 @@ from rigdda import BadInput
 from rigdda.agents.run_record import RECORD_FILE as RECORD
 from rigdda.app.page.forms import button, heading, paragraph, text
 from rigdda.app.page.jobs import FAILED, FINISHED, RUNNING
+from rigdda.app.page.live import CURRENT, NOTHING
+from rigdda.app.page.replays import replay_arguments
+from rigdda.app.page.state import LAYOUT
+from rigdda.app.worst_releases import WORST_FILES
 
 if TYPE_CHECKING:
     from rigdda.app.page.workspace import Host
 
+WORST = 3
+"""Number of the worst releases of each layout and reason."""
+
 PAGES = ("report.html", "report.pdf")
 """Files that a report may have."""
 
-SLOW = 5
+SLOW = 10
 """Number of looks of the page between two looks at the report."""
 
 
 class ReportTab:
     """The tab Report."""
 
-    title = "Report"
-
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.job, self.study = page.workspace.report, page.workspace.study
         self._count = 0
-        self._results = pn.widgets.CheckBoxGroup(name="Results", options=[])
-        self._pdf = pn.widgets.Checkbox(name="Print it to PDF as well", value=True)
+        self._results = pn.widgets.CheckBoxGroup(label="Results", options=[])
+        self._pdf = pn.widgets.Checkbox(label="Print it to PDF as well", value=True)
+        self._worst = pn.widgets.Checkbox(
+            label=f"With the {WORST} worst releases and failures of barriers of each", value=True
+        )
+        self._listed: list[dict[str, str]] = []
+        self._replays = pn.Column(sizing_mode="stretch_width")
+        self._viewed = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._write = button("Write the report", self._begin, primary=True)
         self._again = button("Compute the results of this layout", self._compute)
         self._status = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
@@ -41,8 +54,8 @@ class ReportTab:
             heading("What goes into the report"),
             text("Results are in folders of the project. A search writes one; the button computes "
                  "another of the present layout, compared with the slope without it."),
-            self._again, self._results, self._pdf, self._write, self._status,
-            sizing_mode="stretch_width",
+            self._worst, self._again, self._results, self._pdf, self._write, self._status,
+            self._replays, self._viewed, sizing_mode="stretch_width",
         )  # fmt: skip
 
     def show(self) -> None:
@@ -67,7 +80,8 @@ class ReportTab:
             workspace = self.page.workspace
             if not (self.project.folder / workspace.study_file).is_file():
                 raise BadInput("results", None, "wait until the tab Barriers shows figures")
-            self.study.start(workspace.study_arguments)
+            worst = ["--worst", str(WORST)] if self._worst.value else []
+            self.study.start([*workspace.study_arguments, *worst])
 
         self.page.act(start)
 
@@ -95,8 +109,34 @@ class ReportTab:
         if self.job.command:
             lines.append(f"<code>{html.escape(self.job.command)}</code>")
         self._status.object = "".join(lines)
+        self._show_worst()
+        self._viewed.object = paragraph(self.page.workspace.viewing.look())
         self._write.disabled = self.job.state == RUNNING
         self._again.disabled = self.study.state == RUNNING
+
+    def _show_worst(self) -> None:
+        """List the worst releases of the results of the layout, each with its replay."""
+        found = _rows(self.page.workspace.study_folder / WORST_FILES[0])
+        found = [row for row in found if row["layout"] in (CURRENT, NOTHING)]
+        if found == self._listed:
+            return
+        self._listed = found
+        rows: list[Any] = [heading("The worst releases")] if found else []
+        for row in found:
+            layout = "with the layout" if row["layout"] == CURRENT else row["layout"]
+            words = f"{layout}, {row['why']}: {row['event']}, seed {row['seed']}, "
+            words += f"{float(row['energy_on_road']):,.0f} kilojoules per metre on the road"
+            see = button("Open in rerun", partial(self._open, row), width=130)
+            rows.append(pn.Row(see, text(words), sizing_mode="stretch_width"))
+        self._replays[:] = rows
+
+    def _open(self, row: dict[str, str]) -> None:
+        """Record a release and open it in the rerun viewer."""
+        project, now = self.project, self.project.current
+        layout = project.folder / LAYOUT if row["layout"] == CURRENT else None
+        asked = replay_arguments(project.where.site, layout, row["event"], int(row["seed"]))
+        texts = f"{now.site}\0{now.layout}"
+        self.page.act(lambda: self.page.workspace.viewing.open(asked, texts))
 
     def _link(self, file: Path) -> str:
         """Return a link to a file of the report, if there is one."""
@@ -108,3 +148,12 @@ class ReportTab:
             f"<p><a style='{style}' target='_blank' rel='noopener' "
             f"href='report/{file.name}?{stamp}'>Open {file.name}</a></p>"
         )
+
+
+def _rows(file: Path) -> list[dict[str, str]]:
+    """Return the rows of a table; none if it is not there."""
+    try:
+        with file.open(newline="", encoding="utf-8") as opened:
+            return list(csv.DictReader(opened))
+    except OSError:
+        return []

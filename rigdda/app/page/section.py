@@ -13,13 +13,17 @@ from bokeh.models import ColumnDataSource, HoverTool, Range1d
 from bokeh.plotting import figure
 
 from rigdda import BadInput, Layout, Site
+from rigdda.app.page.locking import on_change
 from rigdda.app.page.theme import Theme
-from rigdda.app.reports.pictures import sources
+from rigdda.app.reports.source_outlines import sources
 from rigdda.barriers import Earthwork, earthworks
 from rigdda.model.survey import spikes
 
 MARGIN = 0.06
 """Share of the length and the height of the ground that is free around it."""
+
+BORDER = 62
+"""Space left of an axis, so that figures below one another are aligned [pixels]."""
 
 HEIGHT = 400
 """Height of the figure [pixels]."""
@@ -69,7 +73,7 @@ class Section:
             height=height, sizing_mode="stretch_width", match_aspect=True,
             tools="pan,wheel_zoom,box_zoom,reset", active_scroll="wheel_zoom", active_drag="pan",
             x_axis_label="chainage [metres]", y_axis_label="elevation [metres]",
-            toolbar_location="right", name=name,
+            toolbar_location="right", name=name, min_border_left=BORDER,
         )  # fmt: skip
         self.plot.toolbar.logo = None
         self.plot.title.text = name
@@ -229,7 +233,7 @@ class HandleSource:
         self._dragged = dragged
         self._given: deque[tuple[list[float], list[float]]] = deque(maxlen=GIVEN)
         self._showing = False
-        self.source.on_change("data", self._changed)
+        on_change(self.source, "data", self._changed)
 
     def show(self, data: dict[str, list[Any]]) -> None:
         """Show handles at other positions."""
@@ -238,6 +242,6 @@ class HandleSource:
         self.source.data = data
         self._showing = False
 
-    def _changed(self, _: str, __: Any, new: Any) -> None:
+    def _changed(self, new: Any) -> None:
         if not self._showing and (list(new["x"]), list(new["y"])) not in self._given:
             self._dragged(new)

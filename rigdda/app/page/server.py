@@ -14,6 +14,7 @@ from tornado.web import OutputTransform, StaticFileHandler
 
 from rigdda import BadInput
 from rigdda.app.page import theme
+from rigdda.app.page.locking import holding
 from rigdda.app.page.page import Page
 from rigdda.app.page.state import Project
 from rigdda.app.page.workspace import Workspace
@@ -36,6 +37,13 @@ HEADERS = {
 """Headers of every answer: nothing is loaded from another machine, and no other page may frame
 this one. Bokeh compiles its templates at run time and needs 'unsafe-eval'."""
 
+
+ICON = (
+    "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 16 16'%3E"
+    "%3Cpath d='M0 2L16 16H0z' fill='%236b4226'/%3E%3Ccircle cx='11' cy='5' r='3' "
+    "fill='%230b5fa5'/%3E%3C/svg%3E"
+)
+"""Icon of the page: a block above a slope."""
 
 REFUSED = b"this address is not that of the page\n"
 """Answer to a request that names another host."""
@@ -79,19 +87,19 @@ def serve(project: Project, port: int | None, browser: bool, say: Callable[[str]
         If the port is taken.
     """
     at, token = free_port(port), secrets.token_urlsafe(TOKEN)
+    hosts = [f"{HOST}:{at}", f"localhost:{at}"]
     pn.extension(sizing_mode=None, notifications=False)
     with Workspace(project) as workspace:
         server: Any = pn.serve(
             {"/": lambda: _session(workspace)},
             address=HOST, port=at, prefix=f"/{token}", show=False, start=False, threaded=False,
-            websocket_origin=[f"{HOST}:{at}", f"localhost:{at}"], title="rigdda", verbose=False,
+            websocket_origin=hosts, title="rigdda", verbose=False,
             extra_patterns=[
                 ("/report/(.*)", StaticFileHandler, {"path": str(workspace.report_folder)})
             ],
             check_unused_sessions_milliseconds=5000, unused_session_lifetime_milliseconds=10000,
+            transforms=[type("Guarded", (Guard,), {"hosts": frozenset(hosts)})],
         )  # fmt: skip
-        hosts = frozenset({f"{HOST}:{at}", f"localhost:{at}"})
-        server._tornado.add_transform(type("Guarded", (Guard,), {"hosts": hosts}))
         address = f"http://{HOST}:{at}/{token}/"
         say(address)
         if browser:
@@ -109,7 +117,10 @@ def _session(workspace: Workspace) -> Any:
     """Return the page of one tab of the browser."""
     colours = theme.DARK if pn.config.theme == "dark" else theme.LIGHT
     pn.config.raw_css = [theme.css(colours)]
-    return Page(workspace, colours).panel
+    pn.state.curdoc.template_variables["app_favicon"] = ICON
+    made: list[Page] = []
+    holding(lambda: made.append(Page(workspace, colours)))
+    return made[0].panel
 
 
 class Guard(OutputTransform):

@@ -14,9 +14,10 @@ import panel as pn
 from bokeh.models import HoverTool, PointDrawTool
 
 from rigdda import BadInput, Site
-from rigdda.app import new_site, site_check, site_oddities
 from rigdda.app.page import edits
+from rigdda.app.page.findings import Findings, Found
 from rigdda.app.page.forms import Bound, button, choice, heading, number, text
+from rigdda.app.page.handles import DIGITS, Handle, handles
 from rigdda.app.page.section import HandleSource, Section
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import spikes
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
 
 Path_ = tuple[str | int, ...]
 
-DIGITS = 2
-"""Decimals of chainages and elevations that are dragged [m]."""
-
 MOST = 40
 """Points of the survey up to which each of them can be dragged."""
 
@@ -36,39 +34,8 @@ WIDE = 400
 """Width of the forms [pixels]."""
 
 
-class Handle:
-    """A place on the slope that is dragged along the ground."""
-
-    def __init__(self, words: str, x: float, path: Path_, item: int | None = None):
-        self.words, self.x, self.path, self.item = words, x, path, item
-
-
-def handles(site: Site) -> list[Handle]:
-    """Return what can be dragged on a site: ends of bands, zone, road and grounds, and the toe."""
-    found = []
-    for i, source in enumerate(site.sources):
-        if source.band is not None:
-            for k, end in enumerate(("upper", "lower")):
-                path: Path_ = ("sources", i, "band", k)
-                found.append(Handle(f"{end} end of {source.name}", source.band[k], path))
-    for table, words, place in (
-        ("road", "of the road", site.road),
-        ("barrier_zone", "of the barrier zone", site.barrier_zone),
-    ):
-        found.append(Handle(f"uphill edge {words}", place.start, (table, "start")))
-        found.append(Handle(f"downhill edge {words}", place.end, (table, "end")))
-    found.append(Handle("toe of the slope", site.slope.toe, ("slope", "toe")))
-    for i, stretch in enumerate(site.slope.surfaces):
-        for end in ("start", "end"):
-            path = ("slope", "surfaces", i, end)
-            found.append(Handle(f"{end} of {stretch.surface}", getattr(stretch, end), path))
-    return found
-
-
 class SlopeTab:
     """The tab Slope."""
-
-    title = "Slope"
 
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
@@ -79,6 +46,9 @@ class SlopeTab:
         self._places = HandleSource(self._dragged)
         self._points = HandleSource(self._dragged_point)
         self._draw_handles()
+        self._checks = Findings()
+        page.workspace.workers.add(self._checks)
+        self._told: Found | None = None
         self._findings = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._forms = pn.Column(width=WIDE, scroll=True, height=610)
         self._import = self._importer()
@@ -98,17 +68,16 @@ class SlopeTab:
         site = self.project.site
         self.section.show(site)
         self._handles = handles(site)
-        ground = site.profile
         self._places.show(
             {
                 "x": [one.x for one in self._handles],
-                "y": [ground.height(one.x) for one in self._handles],
+                "y": [one.y for one in self._handles],
                 "words": [one.words for one in self._handles],
             }
         )
         near = site.slope.points if len(site.slope.points) <= MOST else ()
         self._points.show({"x": [p[0] for p in near], "y": [p[1] for p in near]})
-        self._findings.object = self._found(site)
+        self._checks.ask(site, self.project.where.site)
         structure = _structure(site)
         if structure != self._structure:
             self._structure = structure
@@ -117,7 +86,11 @@ class SlopeTab:
             one.refresh()
 
     def tick(self) -> None:
-        """Nothing is computed for this tab in the background."""
+        """Show what was found on the site meanwhile."""
+        found = self._checks.found
+        if found is not None and found is not self._told:
+            self._told = found
+            self._show_found(found)
 
     def _draw_handles(self) -> None:
         plot, theme = self.section.plot, self.theme
@@ -143,10 +116,7 @@ class SlopeTab:
         """Move what a handle stands for."""
         for one, x in zip(self._handles, new["x"], strict=False):
             if abs(float(x) - one.x) > 10.0**-DIGITS / 2:
-                value = round(float(x), DIGITS)
-                self.page.act(
-                    partial(self.project.set_value, one.path, value, f"moved the {one.words}")
-                )
+                self._change(one.moved(float(x)), f"moved the {one.words}")
                 return
         self.show()
 
@@ -162,17 +132,16 @@ class SlopeTab:
                 return
         self.show()
 
-    def _found(self, site: Site) -> str:
-        """Return what `rigdda check` finds without releases, as a list."""
-        written = site_oddities.written_events(str(self.project.where.site))
-        odd = site_oddities.oddities(site, (), written)
-        count = site_check.placeholders(str(self.project.where.site))
+    def _show_found(self, found: Found) -> None:
+        """Show what `rigdda check` finds without releases, as a list."""
+        odd, count = found.odd, found.placeholders
         head = "Nothing looks odd." if not odd else f"{len(odd)} to look at:"
+        head = found.fault or head
         lines = "".join(f"<li>{html.escape(line)}</li>" for line in odd)
         rest = f"<p>The site file marks {count} values as placeholders to replace.</p>"
         command = f"rigdda check {self.project.where.site}"
-        return (
-            f"<h2 style='font-size:15px;margin:8px 0 2px'>{head}</h2>"
+        self._findings.object = (
+            f"<h2 style='font-size:15px;margin:8px 0 2px'>{html.escape(head)}</h2>"
             f"<ul style='margin:2px 0;padding-left:20px'>{lines}</ul>{rest if count else ''}"
             f"<p style='color:{self.theme.quiet}'>The same, with a few releases: "
             f"<code>{html.escape(command)}</code></p>"
@@ -310,7 +279,7 @@ class SlopeTab:
                 start=1e-3,
             )  # fmt: skip
             design = Bound(
-                pn.widgets.Checkbox(name="Design event", margin=(18, 8)),
+                pn.widgets.Checkbox(label="Design event", margin=(18, 8)),
                 partial(_design, self.project, i),
                 self._set(("events", i, "design"), "design event"),
             )
@@ -363,13 +332,13 @@ class SlopeTab:
 
     def _importer(self) -> Any:
         """Return the form that makes a site of a survey."""
-        name = pn.widgets.TextInput(name="Name of the site", value="section", width=340)
+        name = pn.widgets.TextInput(label="Name of the site", value="section", width=340)
         file = pn.widgets.FileInput(
-            name="Survey", accept=".csv,.txt,.tsv,.xyz,.dat,.dxf", width=340
+            label="Survey", accept=".csv,.txt,.tsv,.xyz,.dat,.dxf", width=340
         )
-        layer = pn.widgets.TextInput(name="Layer of a drawing, if it has several", width=340)
+        layer = pn.widgets.TextInput(label="Layer of a drawing, if it has several", width=340)
         road = [
-            pn.widgets.FloatInput(name=f"Road, {w} edge [metres]", value=None, width=160)
+            pn.widgets.FloatInput(label=f"Road, {w} edge [metres]", value=None, width=160)
             for w in ("one", "other")
         ]
 
@@ -390,6 +359,8 @@ class SlopeTab:
 
     def _import_survey(self, name: str, file: Any, layer: str | None, road: list[Any]) -> None:
         """Make a site of the survey that was chosen, in the place of the present one."""
+        from rigdda.app import new_site
+
         if not file.value:
             raise BadInput("survey", None, "choose a file first")
         ends = (road[0], road[1]) if None not in road else None

@@ -43,7 +43,7 @@ SCALE = ("#443983", "#31688e", "#21918c", "#35b779", "#90d743", "#fde725")
 """Colours of growing values (viridis)."""
 
 CSS = """
-:root { --accent: ACCENT; }
+:root { --accent: ACCENT; color-scheme: SCHEME; }
 html, body { background: PAPER; color: TEXT; margin: 0; }
 body { font: 15px/1.45 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }
 """
@@ -52,4 +52,13 @@ body { font: 15px/1.45 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans
 def css(theme: Theme) -> str:
     """Return the style of the page."""
     out = CSS.replace("ACCENT", theme.accent).replace("PAPER", theme.paper)
-    return out.replace("TEXT", theme.text)
+    return out.replace("TEXT", theme.text).replace("SCHEME", theme.name)
+
+
+def tab_css(theme: Theme) -> str:
+    """Return the style of the titles of the tabs."""
+    return f".bk-tab, .bk-tab.bk-active {{ color: {theme.text}; }}"
+
+
+WRAPPED = ".bk-input-group { display: flex; flex-wrap: wrap; }"
+"""Style of options in a row that continue in the next line."""

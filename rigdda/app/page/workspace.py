@@ -4,20 +4,37 @@ from __future__ import annotations
 
 import os
 import shlex
+import time
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
 import tomli_w
 
+from rigdda.app.page.falls import Release
 from rigdda.app.page.jobs import Job
-from rigdda.app.page.live import Live, study_table
+from rigdda.app.page.live import Live
+from rigdda.app.page.replays import Viewing
 from rigdda.app.page.state import LAYOUT, Project
 from rigdda.app.page.theme import Theme
 from rigdda.files import atomic
 
+AHEAD = 1.0
+"""Longest time for which releases that are drawn go before the figures of the layout [s]."""
+
 STUDY = "study.toml"
 """File of the study that computes the figures of the page."""
+
+
+class Worker(Protocol):
+    """What computes for a tab in a thread; the server ends it before it ends itself."""
+
+    def stop(self) -> None:
+        """End after what is being computed."""
+
+    def join(self) -> None:
+        """Wait until nothing is being computed."""
 
 
 class Workspace:
@@ -35,7 +52,25 @@ class Workspace:
         self.search = Job(project.folder, "search")
         self.study = Job(project.folder, "study")
         self.report = Job(project.folder, "report")
+        self.fit = Job(project.folder, "fit")
+        self.viewing = Viewing(project.folder)
+        self.workers: weakref.WeakSet[Worker] = weakref.WeakSet()
+        self._first: tuple[Release, float] | None = None
         self._study = ""
+
+    def draw_first(self, release: Release) -> None:
+        """Let the releases that are drawn go before the figures of the layout, for a moment."""
+        self._first = release, time.monotonic() + AHEAD
+        self.workers.add(release)
+        self.live.rest()
+
+    @property
+    def draws(self) -> bool:
+        """Whether releases that are drawn go before the figures of the layout."""
+        if self._first is None:
+            return False
+        release, latest = self._first
+        return release.running and time.monotonic() < latest
 
     @property
     def study_file(self) -> Path:
@@ -45,8 +80,13 @@ class Workspace:
     @property
     def study_arguments(self) -> list[str]:
         """Arguments of the command that computes the figures of the layout."""
-        out = self.project.folder / "study"
-        return ["study", str(self.study_file), "--seed", "0", "--out", str(out)]
+        out = str(self.study_folder)
+        return ["study", str(self.study_file), "--seed", "0", "--out", out]
+
+    @property
+    def study_folder(self) -> Path:
+        """The results folder of the figures of the layout."""
+        return self.project.folder / "study"
 
     @property
     def study_command(self) -> str:
@@ -61,14 +101,20 @@ class Workspace:
     @property
     def design_folder(self) -> Path | None:
         """The results folder of the last search; None before the first."""
-        known = self.search.arguments
-        return Path(known[known.index("--out") + 1]) if "--out" in known else None
+        return _results(self.search)
+
+    @property
+    def fit_folder(self) -> Path | None:
+        """The results folder of the last fit; None before the first."""
+        return _results(self.fit)
 
     def write_study(self) -> None:
         """Write the study file of the figures that are known, if it has changed."""
         found, project = self.live.figures, self.project
         if found is None or not found.releases or found.layout != project.layout:
             return
+        from rigdda.app.page.figures import study_table
+
         site = os.path.relpath(project.where.site, project.folder)
         table = study_table(site, found.layout, LAYOUT, found.releases)
         text = tomli_w.dumps(table)
@@ -82,8 +128,18 @@ class Workspace:
 
     def __exit__(self, *_: object) -> None:
         self.live.close()
-        for job in (self.search, self.study, self.report):
+        for worker in (workers := list(self.workers)):
+            worker.stop()
+        for worker in workers:
+            worker.join()
+        for job in (self.search, self.study, self.report, self.fit, self.viewing):
             job.close()
+
+
+def _results(job: Job) -> Path | None:
+    """Return the results folder of the last command of a job; None before the first."""
+    folder = job.option("--out")
+    return Path(folder) if folder else None
 
 
 class Host(Protocol):
@@ -103,8 +159,9 @@ class Host(Protocol):
 class Tab(Protocol):
     """A tab of the page."""
 
-    title: str
     panel: Any
+
+    def __init__(self, page: Host): ...
 
     def show(self) -> None:
         """Show the site and the layout as they are now."""

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigdda import Barrier, Fence, Layout, Mesh, Run, Simulation, Site
+from rigdda.app.reports.source_outlines import sources
 from rigdda.app.reports.stations import (
     ALL_EVENTS,
     PASSING_RATE,
@@ -170,20 +171,6 @@ def envelopes(
     passing = Passing.of(site, layout, None, found)
     rows = summary(passing, range(len(stations)), site.event_names, ("height_top", "energy"))
     return [PassageEnvelope.of(name, rows) for name in site.event_names]
-
-
-def sources(site: Site) -> list[Floats]:
-    """Return the corners of each source [m]: a closed polygon, or the ground line of a band."""
-    ground, out = site.profile, []
-    for source in site.sources:
-        if source.band is None:
-            pieces = (np.array(piece, dtype=np.float64) for _, piece in source.pieces())
-            out += [np.concatenate([piece, piece[:1]]) for piece in pieces]
-        else:
-            start, end = source.band
-            x = [start, *(x for x, _ in site.slope.points if start < x < end), end]
-            out.append(np.array([(at, ground.height(at)) for at in x]))
-    return out
 
 
 def reach(corners: Floats) -> tuple[float, float]:

@@ -249,6 +249,23 @@ EXHIBITS = (
     Exhibit("layouts", "costs.png", "Costs of the layouts of the study", command="study"),
     Exhibit(
         "layouts",
+        "worst.csv",
+        "The worst releases of the study",
+        "Releases with the most energy on the road, and releases in which a barrier fails. "
+        "`rigdda replay` with the event and the seed shows each of them.",
+        (
+            words("layout", "layout"),
+            words("why", "why"),
+            words("event", "event"),
+            value("seed", "seed"),
+            value("energy on the road [kJ/m]", "energy_on_road"),
+            value("volume on the road [m3]", "road_volume"),
+        ),
+        command="study",
+    ),
+    Exhibit("layouts", "worst.png", "The worst releases of the study in section", command="study"),
+    Exhibit(
+        "layouts",
         "costs.csv",
         "Costs with other prices, rates or consequences",
         f"The layouts of the design, priced anew. Z and its parts in {PER_YEAR}; to build: EUR per "

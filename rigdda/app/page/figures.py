@@ -1,0 +1,122 @@
+"""Figures of a layout from the outcomes of its releases: those that `rigdda study` computes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rigdda import Layout, Site
+from rigdda.app.barrier_checks import LayoutChecks, check_layout
+from rigdda.app.page.live import CURRENT, MOST_BARRIERS, NOTHING, LiveFigures, Outcomes
+from rigdda.app.page.placing import kinds_for
+from rigdda.app.reports import study_report
+from rigdda.app.reports.study_report import StudiedLayout, StudyResults
+from rigdda.barriers import KINDS
+from rigdda.envs import DesignProblem
+from rigdda.envs.cost import Account, account, learn
+
+
+def study_layouts(layout: Layout) -> dict[str, Layout]:
+    """Return the layouts of the study of a page: the slope without the layout, and the layout."""
+    return {NOTHING: (), CURRENT: layout} if layout else {NOTHING: ()}
+
+
+def study_table(site: str, layout: Layout, file: str, releases: int) -> dict[str, Any]:
+    """Return the content of a study file that computes the figures of the page.
+
+    Parameters
+    ----------
+    site, file : str
+        The site file and the layout file, as seen from the folder of the study file.
+    layout : Layout
+        The layout.
+    releases : int
+        Number of releases of each event.
+    """
+    tables: list[dict[str, Any]] = [{"name": NOTHING}]
+    if layout:
+        tables.append({"name": CURRENT, "file": file})
+    return {"site": site, "releases": releases, "layouts": tables}
+
+
+def results_of(site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Outcomes]) -> Any:
+    """Return the results of a study from the outcomes of its releases.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    layouts : dict of str to Layout
+        The layouts of the study by name.
+    seen : dict of str to dict of str to list of Outcome
+        For each layout the outcomes of each event, as many of each.
+
+    Returns
+    -------
+    StudyResults
+        The results, equal to those of `rigdda study` on the same releases.
+    """
+    flat = {n: [o for event in site.event_names for o in seen[n][event]] for n in layouts}
+    accounts = {name: account(site, layouts[name], flat[name]) for name in layouts}
+    studied = tuple(
+        StudiedLayout(
+            name,
+            layouts[name],
+            accounts[name],
+            np.array([1e-3 * outcome.max_energy_on_road for outcome in flat[name]]),
+            np.array([1e-3 * max((b.max_energy for b in o.barriers), default=0.0)
+                      for o in flat[name]]),
+        )
+        for name in layouts
+    )  # fmt: skip
+    together = _joined(list(accounts.values()))
+    outcomes = [outcome for name in layouts for outcome in flat[name]]
+    released = np.array([outcome.released_volume for outcome in outcomes])
+    widths = np.array([outcome.width for outcome in outcomes])
+    facts = {}
+    for event in site.event_names:
+        own = together.event == event
+        facts[event] = learn(site, together.of(own), released[own], widths[own], 1.0)
+    return StudyResults(site, studied, facts)
+
+
+def _joined(parts: list[Account]) -> Account:
+    """Return the account of several accounts one after another."""
+    tolls = [part.toll for part in parts if part.toll is not None]
+
+    def column(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    names = ("event", "harm", "repair", "volume", "reached", "failed")
+    toll = np.concatenate(tolls) if tolls else None
+    return Account(**{name: column(name) for name in names}, toll=toll)
+
+
+def broken_rules(site: Site, layout: Layout) -> tuple[str, ...]:
+    """Return the siting rules that a layout breaks, each with its reason."""
+    problem = DesignProblem(site, max_barriers=MOST_BARRIERS)
+    found = problem.place.violations(layout, tuple(KINDS), MOST_BARRIERS)
+    return tuple(dict.fromkeys(map(str, found)))
+
+
+def checked(site: Site, layout: Layout) -> LayoutChecks:
+    """Return the checks of the barriers of a layout."""
+    problem = DesignProblem(site, max_barriers=MOST_BARRIERS, kinds=kinds_for(site))
+    return check_layout(problem, layout)
+
+
+def updated(results: StudyResults, before: LiveFigures, count: int) -> LiveFigures:
+    """Return figures that were known before with those of the results of a study."""
+    rows = study_report.layout_rows(results)
+    name = rows[-1]["layout"]
+    risk = results.risk(results.layouts[-1])
+    return before._replace(
+        releases=count,
+        costs=rows[-1],
+        bare=rows[0],
+        events=tuple(r for r in study_report.event_rows(results) if r["layout"] == name),
+        individual=None if risk is None else (risk.individual.value, *risk.individual.interval),
+        doing="more releases",
+    )

@@ -1,0 +1,144 @@
+"""The tabs without a server: what their buttons do to the project and to what is computed."""
+
+import html
+import time
+import types
+
+import pytest
+from bokeh.document import Document
+
+pn = pytest.importorskip("panel", reason="the extra page is not installed")
+
+from panel.io.state import set_curdoc  # noqa: E402
+
+from rigdda import sites  # noqa: E402
+from rigdda.app import site_check  # noqa: E402
+from rigdda.app.page import ground, locking  # noqa: E402
+from rigdda.app.page.falls_tab import BATCH, FallsTab  # noqa: E402
+from rigdda.app.page.state import Project  # noqa: E402
+from rigdda.app.page.theme import LIGHT  # noqa: E402
+from rigdda.app.page.workspace import Workspace  # noqa: E402
+
+
+class Host:
+    """The page as a tab sees it."""
+
+    def __init__(self, workspace):
+        self.workspace, self.project, self.theme = workspace, workspace.project, LIGHT
+        self.said = []
+
+    def act(self, do):
+        do()
+        return True
+
+    def say(self, words):
+        self.said.append(words)
+
+
+@pytest.fixture
+def host(tmp_path):
+    (tmp_path / "site.toml").write_text(sites.text("quick"), encoding="utf-8")
+    with Workspace(Project.open(tmp_path)) as workspace:
+        yield Host(workspace)
+
+
+def test_a_release_that_is_asked_for_before_the_tab_is_shown_is_not_lost(host):
+    tab = FallsTab(host)
+    tab._more()
+    tab.show()
+    release = tab._release
+    assert release.asked == BATCH
+    release.join()
+    tab.tick()
+    assert len(tab.section.ways.data["xs"]) == len(release.falls) == BATCH
+
+
+def test_a_new_layout_keeps_the_event_that_was_chosen(host):
+    tab = FallsTab(host)
+    tab.show()
+    other = host.project.site.event_names[-1]
+    assert other != host.project.site.event_names[0]
+    tab._event.value = other
+    host.project.set_value(("road", "end"), host.project.site.road.end + 0.5)
+    tab.show()
+    assert tab._event.value == other
+
+
+def test_callbacks_wait_for_the_lock_of_their_document():
+    document, done = Document(), []
+    context = types.SimpleNamespace(session=None, server_context=None)
+    document._session_context = lambda: context
+    with set_curdoc(document):
+        locking.locked(lambda: done.append("later"))
+        assert done == []
+        assert len(document.session_callbacks) == 1
+        locking.holding(lambda: locking.locked(lambda: done.append("at once")))
+        assert done == ["at once"]
+        document.session_callbacks[0].callback()
+        locking.locked(lambda: done.append("later"))
+    assert done == ["at once", "later"]
+    assert len(document.session_callbacks) == 1  # the first has been run
+    locking.locked(lambda: done.append("no server"))
+    assert done[-1] == "no server"
+
+
+def test_what_is_odd_on_a_site_is_told_when_it_is_found(host):
+    from rigdda.app.page.slope_tab import SlopeTab
+
+    tab = SlopeTab(host)
+    tab.show()
+    site = host.project.site
+    host.project.set_value(("road", "end"), site.road.start + 0.6)
+    tab.show()
+    latest = time.monotonic() + 60.0
+    while tab._checks.found is None:
+        assert time.monotonic() < latest
+        time.sleep(0.01)
+    tab.tick()
+    odd = site_check.oddities(host.project.site, ())
+    assert odd
+    assert all(html.escape(line) in tab._findings.object for line in odd)
+
+
+def test_ground_shows_observations_and_writes_what_was_fitted(tmp_path):
+    from rigdda.app.page.ground_tab import GroundTab
+
+    (tmp_path / "site.toml").write_text("# kept\n" + sites.text("verge"), encoding="utf-8")
+    observed = tmp_path / "observed"
+    observed.mkdir()
+    runs = [9.8, 12.3, 14.1, 17.2, 20.5]
+    lines = ["event,run_out_m", *(f"block,{x}" for x in runs)]
+    (observed / "runs.csv").write_text("\n".join(lines), encoding="utf-8")
+    (observed / "marks.csv").write_text("impact_m\n3.5\n", encoding="utf-8")
+    with Workspace(Project.open(tmp_path)) as workspace:
+        page = Host(workspace)
+        tab = GroundTab(page)
+        tab.show()
+        assert tab._stops.data["x"] == runs
+        assert tab._marks.data["x"] == [3.5]
+        _wait(lambda: tab.match.found is not None and tab.match.found.releases == 150)
+        tab.tick()
+        assert len(tab._made.data["x"]) == 152
+        assert f"{tab.match.found.score:.3g} metres" in tab._score.object
+        tab._fitted.value = ["surfaces.soil.rolling"]
+        tab._budget.value, tab._releases.value = 8, 10
+        tab._begin()
+        assert tab.job.state == "running"
+        _wait(lambda: tab.job.state != "running")
+        tab._look()
+        assert tab._apply.visible
+        tab._write()
+        (row,) = ground.fit_rows(workspace.fit_folder)
+        text = (tmp_path / "site.toml").read_text(encoding="utf-8")
+        assert text.startswith("# kept")
+        assert page.project.site.surfaces["soil"].rolling == pytest.approx(row.fitted, abs=1e-6)
+        tab.show()
+        page.project.undo()
+        assert page.project.site.surfaces["soil"].rolling == 0.12
+
+
+def _wait(done, seconds=120.0):
+    latest = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < latest
+        time.sleep(0.02)

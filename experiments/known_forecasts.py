@@ -23,8 +23,17 @@ from rigdda.agents.learning import forecasts
 from rigdda.agents.learning.relative_layouts import candidates
 from rigdda.envs import forecast_table
 
-TRAIN, VALIDATION, TEST = 96, 12, 30
+TRAIN, VALIDATION, TEST = 72, 18, 18
 """Default numbers of sites of each split."""
+WORK = Path("runs/known_forecasts")
+"""Default working folder."""
+
+
+def folder_of(work: Path) -> Path:
+    """Return the folder for forecasts of this version of the mechanics, which is created."""
+    folder = work / f"mechanics-{MECHANICS}"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 @click.command(help=__doc__)
@@ -36,18 +45,18 @@ TRAIN, VALIDATION, TEST = 96, 12, 30
               help="Number of test sites.")  # fmt: skip
 @click.option("--layouts", type=click.IntRange(2), default=forecasts.LAYOUTS, show_default=True,
               help="Number of layouts of the catalogue.")  # fmt: skip
-@click.option("--work", type=click.Path(path_type=Path), default=Path("runs/known_forecasts"),
+@click.option("--work", type=click.Path(path_type=Path), default=WORK,
               show_default=True, help="Working folder.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path), default=forecast_table.SHIPPED,
               show_default=True, help="The file.")  # fmt: skip
 def main(train: int, validation: int, test: int, layouts: int, work: Path, out: Path) -> None:
     """Compute and write the file."""
     counts = {"train": train, "validation": validation, "test": test}
-    names = [name for split, count in counts.items() for name in sites.split(split)[:count]]
+    names = [
+        name for split, count in counts.items() for name in sites.split(f"wide-{split}")[:count]
+    ]
     catalogue = candidates()
-    folder = work / f"mechanics-{MECHANICS}"
-    folder.mkdir(parents=True, exist_ok=True)
-    found = forecasts.collect(names, catalogue, folder, lambda i, name: say(f"{i} {name}"))
+    found = forecasts.collect(names, catalogue, folder_of(work), lambda i, name: say(f"{i} {name}"))
     z = np.array([own.z for own in found[:train]])
     kept = forecasts.choose(z, catalogue, layouts)
     command = f"python -m experiments.known_forecasts --train {train} --validation {validation}"

@@ -91,8 +91,8 @@ class Recipe:
 
     Parameters
     ----------
-    split : {"train", "validation", "test"}
-        Split of the sites.
+    split : str
+        Split of the sites, see `rigdda.sites.split`.
     layouts : int
         Number of layouts of each site.
     releases : int

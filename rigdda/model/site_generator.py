@@ -3,9 +3,9 @@
 The ground of the built-in site is stretched: heights and lengths by common factors and each segment
 by its own factors. All chainages move with the ground, so that bands, zone and surfaces keep their
 places on it. Block sizes, rates, friction, closure costs and prices vary as well, and so do forest,
-existing fences and traffic where the built-in site has them. The ranges are assumptions. The narrow
-ones are those of the first version of the splits. The wide ones, of the second version, let the best
-layouts of two instances of a family differ more.
+existing barriers and traffic where the built-in site has them. The ranges are assumptions. The
+narrow ones are those of the first version of the splits. The wide ones, of the second version, let
+the best layouts of two instances of a family differ more.
 """
 
 from __future__ import annotations
@@ -359,9 +359,7 @@ def _existing(
     return replace(old, x=ground.x(old.x), height=height, condition=weak)
 
 
-def _traffic(
-    traffic: Traffic | None, by: Variation, rng: np.random.Generator
-) -> Traffic | None:
+def _traffic(traffic: Traffic | None, by: Variation, rng: np.random.Generator) -> Traffic | None:
     """Return the traffic with another number of vehicles."""
     if traffic is None:
         return None

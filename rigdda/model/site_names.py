@@ -108,6 +108,17 @@ def split(name: str, family: str | None = None) -> list[str]:
     return [f"{first}-{number}" for number in NUMBERS[name.removeprefix(f"{WIDE}-")]]
 
 
+def family_of(name: str) -> str:
+    """Return the family of a generated site from its name.
+
+    Raises
+    ------
+    BadInput
+        If it is not the name of a generated site.
+    """
+    return instance(name).family
+
+
 def part_of(name: str) -> str | None:
     """Return "train", "validation" or "test" for a site of a split of any version, else None."""
     try:

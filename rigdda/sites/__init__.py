@@ -7,6 +7,7 @@ from rigdda.model.site_names import (
     FAMILIES,
     SPLITS,
     WIDE_FAMILIES,
+    family_of,
     names,
     part_of,
     split,
@@ -18,6 +19,7 @@ __all__ = [
     "SPLITS",
     "WIDE_FAMILIES",
     "design_names",
+    "family_of",
     "load",
     "names",
     "part_of",
@@ -35,7 +37,8 @@ def load(name: str) -> Site:
     """Return a built-in or generated site by its name.
 
     Names of generated sites are such as "bench-17" (of a family) or "random-17" (of any family),
-    and with wide ranges "wide-bench-17" or "wide-17", see `split`. The same name always gives the same site.
+    and with wide ranges "wide-bench-17" or "wide-17", see `split`. The same name always gives the
+    same site.
 
     Raises
     ------

@@ -143,7 +143,7 @@ def test_forecasts_of_another_catalogue_are_refused(tmp_path: Path) -> None:
 def test_the_best_layout_of_a_family_is_chosen_on_its_training_sites(table: ForecastTable) -> None:
     best = training.best_of_families(table)
     assert set(best) == {"verge", "bench", "talus", "narrow", "cliff", "shu-hwa"}
-    rows = [r for r in table.rows("train") if training.family_of(table.names[r]) == "talus"]
+    rows = [r for r in table.rows("train") if sites.family_of(table.names[r]) == "talus"]
     mean = np.where(table.mask[rows], table.z[rows], 1.0).mean(axis=0)
     assert best["talus"][0] == int(mean.argmin()) and best["talus"][-1] == int(mean.argmax())
 

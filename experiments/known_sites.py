@@ -33,7 +33,7 @@ SPLITS = ("validation", "test")
 EXAM = specification.load()
 ALWAYS = (
     "quick",
-    *sites.design_names(),
+    *dict.fromkeys((*sites.design_names(), *sites.WIDE_FAMILIES)),
     *EXAM.sites,
     *(name for corridor in EXAM.corridors for name in corridor.sites),
 )

@@ -57,13 +57,13 @@ def main(train: int, validation: int, test: int, layouts: int, work: Path, out: 
     ]
     catalogue = candidates()
     found = forecasts.collect(names, catalogue, folder_of(work), lambda i, name: say(f"{i} {name}"))
-    z = np.array([own.z for own in found[:train]])
+    z = np.array([own.z for name, own in found.items() if sites.part_of(name) == "train"])
     kept = forecasts.choose(z, catalogue, layouts)
     command = f"python -m experiments.known_forecasts --train {train} --validation {validation}"
     notes = {"command": f"{command} --test {test} --layouts {layouts}"}
-    forecasts.table(names, found, catalogue, kept, notes).save(out)
+    forecasts.table(found, catalogue, kept, notes).save(out)
     whole, own = (np.nanmin(z[:, some], axis=1).mean() for some in (slice(None), kept))
-    say(f"{len(names)} sites, {out.stat().st_size / 1e3:.0f} kB")
+    say(f"{len(found)} sites, {out.stat().st_size / 1e3:.0f} kB")
     say("mean of the least forecast Z over Z without barriers on the training sites:")
     say(f"{whole:.3f} of all candidates, {own:.3f} of the catalogue")
 

@@ -12,7 +12,7 @@ Writes wide_sites.csv, one row per site. An interrupted run is resumed. Judged b
 of the best layout of the family to the best of all candidates on wide sites, over Z without
 barriers. A policy that chooses from these layouts cannot gain more than this over the family.
 Forecasts of wide sites are read from the working folder of `experiments.known_forecasts`, if they
-are there.
+are there. Sites where Z without barriers is below `forecasts.LEAST_COST` are left out.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from experiments.script import Number, interval, main, say, write
 from experiments.search_gain import load
 from rigdda import MECHANICS, sites
 from rigdda.agents.learning import forecasts
+from rigdda.agents.learning.forecasts import SiteForecasts
 from rigdda.agents.learning.relative_layouts import candidates
 
 MASSES = "shu-hwa"
@@ -45,15 +46,14 @@ def names(ranges: str, count: int) -> list[str]:
     return [name for name in first if sites.family_of(name) != MASSES]
 
 
-def row(name: str, ranges: str, folder: Path) -> dict[str, Any]:
+def row(name: str, ranges: str, own: SiteForecasts) -> dict[str, Any]:
     """Return the row of a site: least forecasts, and those of all layouts."""
     catalogue = candidates()
-    (own,) = forecasts.collect([name], catalogue, folder, lambda *_: None)
     count = np.array([len(json.loads(layout)) for layout in catalogue])
     least = {k: float(np.nanmin(np.where(count == k, own.z, np.nan), initial=1.0)) for k in (1, 2)}
     return {
         "site": name, "family": sites.family_of(name), "ranges": ranges, "mechanics": MECHANICS,
-        "least": float(np.nanmin(own.z)), "single": least[1], "pair": least[2],
+        "z_nothing": own.nothing, "least": float(np.nanmin(own.z)), "single": least[1], "pair": least[2],
         "z": json.dumps([None if np.isnan(z) else round(float(z), 4) for z in own.z]),
     }  # fmt: skip
 
@@ -98,11 +98,12 @@ def run(quick: bool, out: Path) -> Number:
     rows: list[Any] = load(path)
     known, folder = {r["site"] for r in rows}, folder_of(WORK)
     for ranges, count in (QUICK_SITES if quick else SITES).items():
-        for name in names(ranges, count):
-            if name not in known:
-                say(name)
-                rows.append(row(name, ranges, folder))
-                write(path, rows)
+        asked = [name for name in names(ranges, count) if name not in known]
+        for name in asked:
+            say(name)
+            found = forecasts.collect([name], candidates(), folder, lambda *_: None)
+            rows += [row(name, ranges, own) for own in found.values()]
+            write(path, rows)
     lines, ends = [], {}
     for ranges in ("narrow", "wide"):
         ends[ranges], told = gaps(rows, ranges)

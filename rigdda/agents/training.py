@@ -167,9 +167,10 @@ def table_of(terms: Terms, out: Path, tick: Tick) -> ForecastTable:
     folder.mkdir(parents=True, exist_ok=True)
     names = sites.split(TRAIN)[: terms.sites]
     found = forecasts.collect(names, catalogue, folder, tick)
-    kept = forecasts.choose(np.array([own.z for own in found]), catalogue, forecasts.LAYOUTS)
+    z = np.array([own.z for own in found.values()])
+    kept = forecasts.choose(z, catalogue, forecasts.LAYOUTS)
     notes = {"command": f"rigdda train --sites {terms.sites}"}
-    table = forecasts.table(names, found, catalogue, kept, notes)
+    table = forecasts.table(found, catalogue, kept, notes)
     table.save(out / "forecasts.safetensors")
     return ForecastTable.load(out / "forecasts.safetensors")  # rounded as in the file
 

@@ -57,9 +57,11 @@ class Variation:
         Factor on the lengths between the toe and the road [-].
     segment_length, segment_height : (float, float)
         Further factors on the length and the height of each segment [-].
-    size, rate, closure, price : float
-        Greatest deviations of the logarithms of the block areas, of the rate of each event, of the
-        cost of a day of closure and of the prices of each kind of barrier [-].
+    size, rate, price : float
+        Greatest deviations of the logarithms of the block areas, of the rate of each event and of
+        the prices of each kind of barrier [-].
+    closure : (float, float)
+        Deviation of the logarithm of the cost of a day of closure [-].
     friction : float
         Greatest change of the friction angles [deg].
     restitution : (float, float)
@@ -71,8 +73,8 @@ class Variation:
     stems, condition, sag : (float, float)
         Factors on the stems of a forest per area, on the strength of existing fences and on the
         height of existing barriers [-].
-    traffic : float
-        Greatest deviation of the logarithm of the number of vehicles [-].
+    traffic : (float, float)
+        Deviation of the logarithm of the number of vehicles [-].
     plausible : bool
         Whether properties of surfaces are limited to the ranges of their grounds in the library.
     """
@@ -84,7 +86,7 @@ class Variation:
     segment_height: Range = (0.96, 1.04)
     size: float = 0.35
     rate: float = 0.5
-    closure: float = 0.4
+    closure: Range = (-0.4, 0.4)
     price: float = 0.25
     friction: float = 2.0
     restitution: Range = (0.75, 1.25)
@@ -93,7 +95,7 @@ class Variation:
     stems: Range = (0.7, 1.3)
     condition: Range = (0.7, 1.3)
     sag: Range = (0.9, 1.1)
-    traffic: float = 0.4
+    traffic: Range = (-0.4, 0.4)
     plausible: bool = False
 
 
@@ -108,7 +110,7 @@ WIDE = Variation(
     segment_height=(0.85, 1.18),
     size=1.0,
     rate=0.8,
-    closure=0.8,
+    closure=(-1.8, 0.5),
     price=0.6,
     friction=4.0,
     restitution=(0.5, 1.5),
@@ -117,7 +119,7 @@ WIDE = Variation(
     stems=(0.3, 1.8),
     condition=(0.4, 2.2),
     sag=(0.7, 1.4),
-    traffic=1.0,
+    traffic=(-1.8, 0.5),
     plausible=True,
 )
 """Ranges of the second version of the splits, with which the best layouts of two instances of a
@@ -330,7 +332,7 @@ def _prices(prices: Prices, by: Variation, rng: np.random.Generator) -> Prices:
 
 def _consequences(what: Consequences, by: Variation, rng: np.random.Generator) -> Consequences:
     """Return consequences with another cost per day of closure, as for another traffic volume."""
-    factor = float(np.exp(rng.uniform(-by.closure, by.closure)))
+    factor = float(np.exp(rng.uniform(*by.closure)))
     return replace(what, closure=round(what.closure * factor, -2))
 
 
@@ -363,7 +365,7 @@ def _traffic(traffic: Traffic | None, by: Variation, rng: np.random.Generator) -
     """Return the traffic with another number of vehicles."""
     if traffic is None:
         return None
-    factor = float(np.exp(rng.uniform(-by.traffic, by.traffic)))
+    factor = float(np.exp(rng.uniform(*by.traffic)))
     return replace(traffic, vehicles_per_day=round(traffic.vehicles_per_day * factor, -1))
 
 

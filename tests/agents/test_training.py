@@ -129,10 +129,10 @@ def test_the_catalogue_serves_all_sites() -> None:
 
 def test_forecasts_of_another_catalogue_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "a.npz"
-    own = SiteForecasts(np.zeros(WIDTH, np.float32), np.zeros((2, FEATURES)), np.ones(2))
+    own = SiteForecasts(np.zeros(WIDTH, np.float32), np.zeros((2, FEATURES)), np.ones(2), 50.0)
     own.save(file, ["[]", "a"])
     read = SiteForecasts.load(file, ["[]", "a"])
-    assert (read.z == own.z).all()
+    assert (read.z == own.z).all() and read.nothing == 50.0
     with pytest.raises(BadInput, match="another version"):
         SiteForecasts.load(file, ["[]", "b"])
     file.write_bytes(b"PK")

@@ -53,7 +53,8 @@ def row(name: str, ranges: str, own: SiteForecasts) -> dict[str, Any]:
     least = {k: float(np.nanmin(np.where(count == k, own.z, np.nan), initial=1.0)) for k in (1, 2)}
     return {
         "site": name, "family": sites.family_of(name), "ranges": ranges, "mechanics": MECHANICS,
-        "z_nothing": own.nothing, "least": float(np.nanmin(own.z)), "single": least[1], "pair": least[2],
+        "z_nothing": own.nothing, "least": float(np.nanmin(own.z)),
+        "single": least[1], "pair": least[2],
         "z": json.dumps([None if np.isnan(z) else round(float(z), 4) for z in own.z]),
     }  # fmt: skip
 

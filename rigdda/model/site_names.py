@@ -11,6 +11,9 @@ from rigdda.errors import BadInput
 FAMILIES = ("verge", "bench", "talus", "narrow", "cliff", "shu-hwa")
 """Families of design sites, each named after its built-in site."""
 
+TRAINING_SPLIT = "train"
+"""Split that the value network and the agent of corridors are trained on."""
+
 WIDE_FAMILIES = (
     "verge", "bench", "talus", "narrow", "cliff", "slab-cut", "forest", "terrace", "old-fence",
 )  # fmt: skip

@@ -14,7 +14,7 @@ import panel as pn
 from bokeh.models import HoverTool, PointDrawTool
 
 from rigdda import BadInput, Site
-from rigdda.app import new_site, site_check
+from rigdda.app import new_site, site_check, site_oddities
 from rigdda.app.page import edits
 from rigdda.app.page.forms import Bound, button, choice, heading, number, text
 from rigdda.app.page.section import HandleSource, Section
@@ -164,8 +164,8 @@ class SlopeTab:
 
     def _found(self, site: Site) -> str:
         """Return what `rigdda check` finds without releases, as a list."""
-        written = site_check.written_events(str(self.project.where.site))
-        odd = site_check.oddities(site, (), written)
+        written = site_oddities.written_events(str(self.project.where.site))
+        odd = site_oddities.oddities(site, (), written)
         count = site_check.placeholders(str(self.project.where.site))
         head = "Nothing looks odd." if not odd else f"{len(odd)} to look at:"
         lines = "".join(f"<li>{html.escape(line)}</li>" for line in odd)

@@ -39,10 +39,12 @@ from rigdda.envs import DesignProblem, forecast_table
 from rigdda.envs.envelope import largest
 from rigdda.envs.forecast_table import ForecastTable
 from rigdda.files import atomic
-from rigdda.model.site_names import TRAINING_SPLIT, built_in, instance
 
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]
+
+TRAIN, VALIDATION = "wide-train", "wide-validation"
+"""Splits of the sites of a new table and of the comparison."""
 
 ALGORITHMS = ("gradient", "ppo")
 """Algorithms for learning on forecasts, see `rigdda.agents.learning`."""
@@ -85,7 +87,7 @@ class Terms:
 
     def __post_init__(self) -> None:
         if self.sites:
-            check.integer("sites", self.sites, 2, len(sites.split(TRAINING_SPLIT)))
+            check.integer("sites", self.sites, 2, len(sites.split(TRAIN)))
         check.one_of("algorithm", self.algorithm, ALGORITHMS)
         check.integer("simulate", self.simulate, 0, forecasts.LAYOUTS)
         check.integer("seed", self.seed, 0, limits.SEED)
@@ -163,11 +165,12 @@ def table_of(terms: Terms, out: Path, tick: Tick) -> ForecastTable:
         return table
     folder, catalogue = out / "sites", candidates()
     folder.mkdir(parents=True, exist_ok=True)
-    names = sites.split(TRAINING_SPLIT)[: terms.sites]
+    names = sites.split(TRAIN)[: terms.sites]
     found = forecasts.collect(names, catalogue, folder, tick)
-    kept = forecasts.choose(np.array([own.z for own in found]), catalogue, forecasts.LAYOUTS)
+    z = np.array([own.z for own in found.values()])
+    kept = forecasts.choose(z, catalogue, forecasts.LAYOUTS)
     notes = {"command": f"rigdda train --sites {terms.sites}"}
-    table = forecasts.table(names, found, catalogue, kept, notes)
+    table = forecasts.table(found, catalogue, kept, notes)
     table.save(out / "forecasts.safetensors")
     return ForecastTable.load(out / "forecasts.safetensors")  # rounded as in the file
 
@@ -189,7 +192,7 @@ def learn(
     except ModuleNotFoundError as error:
         hint = f"install {error.name}: pip install 'rigdda[rl]'"
         raise BadInput("model", "policy", hint) from None
-    rows = table.rows(TRAINING_SPLIT)
+    rows = table.rows("train")
     given, mask = table.features[rows], table.mask[rows]
     bare = Network(*scaling(given[mask]), [], notes)
     torch.set_num_threads(1)
@@ -227,19 +230,14 @@ def _agree(asked: dict[str, Any], out: Path) -> None:
         part.write_bytes(msgspec.json.encode(asked))
 
 
-def family_of(name: str) -> str:
-    """Return the family of a generated site."""
-    return built_in(*instance(name))
-
-
 def best_of_families(table: ForecastTable) -> dict[str, list[int]]:
     """Return for each family the catalogue in the order of mean forecast Z on its training sites.
 
     A layout that cannot be built on a site counts as no barrier there. Layouts are given by their
     numbers in the catalogue, the best first.
     """
-    rows = table.rows(TRAINING_SPLIT)
-    families = np.array([family_of(table.names[row]) for row in rows])
+    rows = table.rows("train")
+    families = np.array([sites.family_of(table.names[row]) for row in rows])
     reward = table.reward[rows]
     return {
         name: np.argsort(-reward[families == name].mean(axis=0), kind="stable").tolist()
@@ -254,7 +252,7 @@ def methods(policy: Policy, table: ForecastTable, problem: DesignProblem) -> dic
     that can be built (`best_of_families`), which is told the family of the site.
     """
     menu = Menu(problem)
-    order = best_of_families(table).get(family_of(problem.site.name), [0])
+    order = best_of_families(table).get(sites.family_of(problem.site.name), [0])
     family = (placed(menu, table.layouts[i]) for i in order)
     found = {
         "nothing": (),
@@ -292,7 +290,7 @@ def compare(
         If a simulation diverges.
     """
     table, store = table_of(terms, out, tick), Store(out / "evaluations.jsonl")
-    return compared(policy, table, sites.split("validation")[:count], releases, store, tick)
+    return compared(policy, table, sites.split(VALIDATION)[:count], releases, store, tick)
 
 
 def compared(

@@ -91,8 +91,8 @@ class Recipe:
 
     Parameters
     ----------
-    split : {"train", "validation", "test"}
-        Split of the sites.
+    split : str
+        Split of the sites, see `rigdda.sites.split`.
     layouts : int
         Number of layouts of each site.
     releases : int
@@ -110,7 +110,7 @@ class Recipe:
     max_barriers: int = 3
 
     def __post_init__(self) -> None:
-        check.one_of("split", self.split, ("train", "validation", "test"))
+        check.one_of("split", self.split, sites.SPLITS)
         check.integer("layouts", self.layouts, 1, JOB_RELEASES)
         check.integer("releases", self.releases, 1, JOB_RELEASES)
         check.integer("seed", self.seed, 0, SEED)

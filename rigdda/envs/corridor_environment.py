@@ -122,7 +122,7 @@ class CorridorDesign(LayoutEnv):
     Parameters
     ----------
     site : str, path, Site, Corridor or sequence of sites
-        Where sections come from: a split of the generated sites ("train", "validation", "test"), a
+        Where sections come from: a split of the generated sites (see `rigdda.sites.split`), a
         site or a sequence of sites, from which `sections` are drawn without repetition, or a
         corridor (also its name or file), whose sections are all taken. Targets of its sections
         are not used.

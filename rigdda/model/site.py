@@ -39,7 +39,7 @@ from rigdda.model.block import Block
 from rigdda.model.outcome import Outcome
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
-from rigdda.model.site_generator import generate
+from rigdda.model.site_generator import NARROW, WIDE, generate
 from rigdda.model.site_tables import Drawn, Event, SiteTables
 from rigdda.model.soundness import check_site
 from rigdda.model.source import Source
@@ -129,8 +129,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         """Return a built-in or generated site by its name, see `rigdda.sites.load`."""
         if name in site_names.names():
             return cls.parse(site_names.text(name), name)
-        family, number = site_names.instance(name)
-        return generate(cls.named(site_names.built_in(family, number)), name, number)
+        family, number, wide = site_names.instance(name)
+        return generate(cls.named(family), name, number, WIDE if wide else NARROW)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the site as TOML; the inverse of `load`.

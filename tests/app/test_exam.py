@@ -20,7 +20,7 @@ from rigdda.app.exam import counter, ranking, scorer, specification
 from rigdda.app.exam.counter import practice
 from rigdda.app.exam.specification import Anchor, References, tables
 from rigdda.envs import DesignProblem
-from rigdda.model.site_names import SPLITS, instance
+from rigdda.model.site_names import NUMBERS, instance
 
 SITES = ("narrow-2000000003", "cliff-2000000004")
 
@@ -140,9 +140,9 @@ def test_no_split_contains_a_site_of_the_exam() -> None:
     assert len(asked.sites) == 24 and len(asked.corridors) == 3
     assert len(set(names)) == len(names) == 36
     for name in names:
-        family, number = instance(name)
-        assert family in sites.FAMILIES
-        assert not any(number in numbers for numbers in SPLITS.values())
+        family, number, wide = instance(name)
+        assert family in sites.FAMILIES and not wide
+        assert not any(number in numbers for numbers in NUMBERS.values())
 
 
 def test_every_task_of_the_exam_has_a_reference_that_may_be_built() -> None:

@@ -22,7 +22,6 @@ from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
 from rigdda.envs.forecast_table import ForecastTable
 from rigdda.files import atomic
-from rigdda.model.site_names import TRAINING_SPLIT
 
 Floats = NDArray[np.float64]
 
@@ -83,7 +82,7 @@ def collect(table: ForecastTable, count: int, folder: Path, tick: Tick) -> Float
         If a simulation diverges.
     """
     found = []
-    for i, row in enumerate(table.rows(TRAINING_SPLIT).tolist()):
+    for i, row in enumerate(table.rows("train").tolist()):
         name = table.names[row]
         tick(i, name)
         path = folder / f"{name}-outcomes.npz"

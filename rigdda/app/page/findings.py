@@ -60,6 +60,9 @@ class Findings:
     def _work(self, site: Site, file: Path) -> None:
         # imported by the thread: the page opens sooner
         from rigdda.app import site_check, site_oddities
+
+        try:
+            written = site_oddities.written_events(str(file))
             odd = site_oddities.oddities(site, (), written)
             found = Found(tuple(odd), site_check.placeholders(str(file)))
         except (Error, OSError) as error:

@@ -4,14 +4,16 @@ import asyncio
 import http.client
 import subprocess
 import sys
+import types
 from urllib.parse import urlsplit
 
 import pytest
 from click.testing import CliRunner
+from tornado.websocket import WebSocketClosedError
 
 from rigdda import BadInput, sites
 from rigdda.app.commands import open as command
-from rigdda.app.page.server import HEADERS, REFUSED, free_port
+from rigdda.app.page.server import HEADERS, REFUSED, free_port, report
 
 
 def _get(address: str, path: str, **headers: str) -> tuple[int, dict[str, str], bytes]:
@@ -86,3 +88,13 @@ def test_other_commands_do_not_import_the_page():
     code = "import sys, rigdda.app.cli; print([m for m in ('panel', 'bokeh') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_a_tab_that_is_closed_while_it_is_sent_to_is_no_error():
+    told = []
+    loop = types.SimpleNamespace(default_exception_handler=told.append)
+    report(loop, {"exception": WebSocketClosedError()})
+    other = {"exception": ValueError("other")}
+    report(loop, other)
+    report(loop, {"message": "no exception"})
+    assert told == [other, {"message": "no exception"}]

@@ -18,7 +18,7 @@ from rigdda.app.page.forms import Bound, button, heading, in_words, number, para
 from rigdda.app.page.live import LiveFigures
 from rigdda.app.page.placing import Grip
 from rigdda.app.page.section import HandleSource, Section
-from rigdda.app.page.theme import SERIES
+from rigdda.app.page.theme import SERIES, TALL
 from rigdda.barriers.fence import FENCE_CLASSES
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class BarriersTab:
             pn.Column(
                 self._figures, heading("Alternatives"),
                 pn.Row(self._name, button("Keep this layout", self._keep, margin=(18, 8))),
-                self._compared, self._alternatives, width=WIDE, scroll=True, height=610,
+                self._compared, self._alternatives, width=WIDE, scroll=True, styles=TALL,
             ),
             sizing_mode="stretch_width",
         )  # fmt: skip

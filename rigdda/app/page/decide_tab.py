@@ -20,7 +20,7 @@ from rigdda.app.page.jobs import CANCELLED, FAILED, INTERRUPTED, RUNNING, Tried,
 from rigdda.app.page.live import MOST_BARRIERS
 from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.section import plain_axes
-from rigdda.app.page.theme import SERIES, WRAPPED
+from rigdda.app.page.theme import SERIES, TALL, WRAPPED
 from rigdda.envs import DesignProblem
 from rigdda.fields import described
 from rigdda.ground.prices import Consequences, Prices
@@ -98,7 +98,7 @@ class DecideTab:
         self._table = pn.Column(sizing_mode="stretch_width")
         self._revision = -1
         self._compared = pn.pane.HTML("", sizing_mode="stretch_width", margin=(8, 8))
-        self._prices = pn.Column(width=WIDE, scroll=True, height=610)
+        self._prices = pn.Column(width=WIDE, scroll=True, styles=TALL)
         self.panel = pn.Row(
             pn.Column(
                 pn.Row(self._designer, self._budget, self._verify, self._cost),

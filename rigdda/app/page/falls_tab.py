@@ -21,7 +21,7 @@ from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.replays import replay_arguments
 from rigdda.app.page.section import BORDER, Section, plain_axes
 from rigdda.app.page.state import LAYOUT
-from rigdda.app.page.theme import SCALE, SERIES
+from rigdda.app.page.theme import SCALE, SERIES, TALL
 from rigdda.app.reports import simulation_report, stations
 from rigdda.app.reports.stations import QUANTITIES, Passing
 from rigdda.passages import Passages, passages
@@ -159,7 +159,7 @@ class FallsTab:
                       self._histogram, self._collector, heading("Replay"),
                       pn.Row(self._time, self._play), self._rerun, self._view, self._viewed,
                       self._tracks,
-                      width=WIDE, scroll=True, height=610),
+                      width=WIDE, scroll=True, styles=TALL),
             sizing_mode="stretch_width",
         )  # fmt: skip
 

@@ -20,7 +20,7 @@ from rigdda.app.page.ground import Compared, Match, Observations
 from rigdda.app.page.jobs import CANCELLED, FAILED, FINISHED, INTERRUPTED, RUNNING
 from rigdda.app.page.locking import watch
 from rigdda.app.page.section import Section, plain_axes
-from rigdda.app.page.theme import SERIES, WRAPPED
+from rigdda.app.page.theme import SERIES, TALL, WRAPPED
 from rigdda.app.uncertainty.observations import DEPOSIT, OBSERVED_RUN_OUT
 from rigdda.app.uncertainty.parameters import Parameter
 from rigdda.app.uncertainty.parameters import ground as grounds_of
@@ -93,7 +93,7 @@ class GroundTab:
         right = pn.Column(
             heading("Observations"), text(FORMS), self._upload,
             button("Add the observations", self._add), self._files, self._sliders,
-            width=WIDE, scroll=True, height=610,
+            width=WIDE, scroll=True, styles=TALL,
         )  # fmt: skip
         self.panel = pn.Row(
             pn.Column(self.section.plot, pn.Row(self._set, self._score), self._curves, *self._fit,

@@ -11,7 +11,7 @@ from functools import partial
 import panel as pn
 
 from rigdda import BadInput, Error
-from rigdda.app.page.forms import button
+from rigdda.app.page.forms import button, text
 from rigdda.app.page.locking import holding, locked, watch
 from rigdda.app.page.state import Conflict
 from rigdda.app.page.theme import Theme, tab_css
@@ -67,7 +67,10 @@ class Page:
         self._keep = button("Keep what the page shows", self._keep_mine, visible=False)
         self._built: dict[str, Tab] = {}
         self._tabs = pn.Tabs(
-            *((title, pn.Column(sizing_mode="stretch_width")) for title in TABS),
+            *(
+                (title, pn.Column(text("One moment."), sizing_mode="stretch_width"))
+                for title in TABS
+            ),
             sizing_mode="stretch_width",
             stylesheets=[tab_css(theme)],
         )
@@ -180,5 +183,5 @@ class Page:
         tab = self.active
         tab.show()
         place = self._tabs[self._tabs.active]
-        if not len(place):  # drawn with its data
-            place.append(tab.panel)
+        if place[0] is not tab.panel:  # drawn with its data
+            place[:] = [tab.panel]

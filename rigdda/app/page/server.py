@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 import socket
 import webbrowser
@@ -11,6 +12,7 @@ from typing import Any
 import panel as pn
 from tornado.httputil import HTTPHeaders, HTTPServerRequest
 from tornado.web import OutputTransform, StaticFileHandler
+from tornado.websocket import WebSocketClosedError
 
 from rigdda import BadInput
 from rigdda.app.page import theme
@@ -104,6 +106,7 @@ def serve(project: Project, port: int | None, browser: bool, say: Callable[[str]
         say(address)
         if browser:
             webbrowser.open(address)
+        server.io_loop.asyncio_loop.set_exception_handler(report)
         server.start()
         try:
             server.io_loop.start()
@@ -111,6 +114,12 @@ def serve(project: Project, port: int | None, browser: bool, say: Callable[[str]
             pass
         finally:
             server.stop()
+
+
+def report(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Report an exception of a task of the server, unless a tab was closed while it was sent to."""
+    if not isinstance(context.get("exception"), WebSocketClosedError):
+        loop.default_exception_handler(context)
 
 
 def _session(workspace: Workspace) -> Any:

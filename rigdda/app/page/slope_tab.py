@@ -19,6 +19,7 @@ from rigdda.app.page.findings import Findings, Found
 from rigdda.app.page.forms import Bound, button, choice, heading, number, text
 from rigdda.app.page.handles import DIGITS, Handle, handles
 from rigdda.app.page.section import HandleSource, Section
+from rigdda.app.page.theme import TALL
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import spikes
 
@@ -50,7 +51,7 @@ class SlopeTab:
         page.workspace.workers.add(self._checks)
         self._told: Found | None = None
         self._findings = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
-        self._forms = pn.Column(width=WIDE, scroll=True, height=610)
+        self._forms = pn.Column(width=WIDE, scroll=True, styles=TALL)
         self._import = self._importer()
         self.panel = pn.Row(
             pn.Column(self.section.plot, self._findings, sizing_mode="stretch_width"),

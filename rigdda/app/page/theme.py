@@ -60,5 +60,8 @@ def tab_css(theme: Theme) -> str:
     return f".bk-tab, .bk-tab.bk-active {{ color: {theme.text}; }}"
 
 
+TALL = {"height": "max(610px, calc(100vh - 100px))"}
+"""Style of a column as high as the window below the titles of the tabs."""
+
 WRAPPED = ".bk-input-group { display: flex; flex-wrap: wrap; }"
 """Style of options in a row that continue in the next line."""

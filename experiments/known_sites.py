@@ -36,8 +36,9 @@ ALWAYS = (
     *dict.fromkeys((*sites.design_names(), *sites.WIDE_FAMILIES)),
     *EXAM.sites,
     *(name for corridor in EXAM.corridors for name in corridor.sites),
+    *sites.split("wide-validation")[:6],
 )
-"""Built-in sites and those of the exam."""
+"""Built-in sites, those of the exam, and those of the comparison of `rigdda train`."""
 
 
 @click.command(help=__doc__)

@@ -1,6 +1,6 @@
 """The command line: `rigdda sites | simulate | design | reprice | study | train | ...`.
 
-The commands are in `rigdda.app.commands`, with one module for each.
+The commands are in `rigdda.app.commands`, with one module for each, and are listed in `COMMANDS`.
 """
 
 from __future__ import annotations

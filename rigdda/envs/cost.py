@@ -2,7 +2,8 @@
 
 `account` computes the cost of each release, `learn` summarises the releases of an event, and
 `judge` evaluates a layout: its expected harm, repair cost and capital cost, and the probabilities
-that the road is reached and that a barrier fails.
+that the road is reached and that a barrier fails. The cost of one release is that of `Site.bill`,
+and the capital cost per year that of `Site.annual`.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Their common base `BarrierEnv` splits each step in two around the simulation: `ask` returns what
 must be simulated and `tell` processes the answer, so that a batch of environments can be simulated
-together.
+together. The reward is computed by `DesignProblem.reward` (`rigdda.envs.problem`).
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Loads on blocks, supports, and acceleration histories of the ground.
 
 The loads are the point load, line load and body force of the paper, the supports its fixed point
-and rock bolt. `rigdda.dynamics.contact.links` computes the effect of supports.
+and rock bolt. A scene takes them as `Scene(loads=..., supports=...)`.
+`rigdda.dynamics.contact.links` computes the effect of supports.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Outcome of a release: rock on the road, and loads and damage of each barrier."""
+"""Outcome of a release: rock on the road, and loads and damage of each barrier.
+
+`rigdda.measurement` computes outcomes. `OUTCOME_COLUMNS` and `BARRIER_COLUMNS` in
+`rigdda.app.reports.tables` are the columns of their tables.
+"""
 
 from __future__ import annotations
 

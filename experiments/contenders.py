@@ -8,8 +8,8 @@ import numpy as np
 
 from rigdda import Barrier, Layout
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.envs import DesignProblem
+from rigdda.seeds import release_seeds
 
 KEPT = 0.3
 """Fraction of the candidates that advances to the next round."""

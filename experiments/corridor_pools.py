@@ -16,11 +16,11 @@ from rigdda import MECHANICS, Barrier, Ditch, Embankment, Fence, GravityWall, La
 from rigdda.agents.designers import front, rule
 from rigdda.agents.designers.constant import place
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.barriers import from_table, to_tables
 from rigdda.envs import DesignProblem
 from rigdda.envs.outcome_cache import pack, unpack
 from rigdda.files import atomic
+from rigdda.seeds import release_seeds
 
 FOLDER = Path("runs/corridor-pools")
 """Folder of the outcomes."""

@@ -28,10 +28,11 @@ from rigdda.agents.corridor.planning import Planner
 from rigdda.agents.designers import race
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import release_seeds, verify
+from rigdda.agents.designers.protocol import verify
 from rigdda.app.exam import specification
 from rigdda.app.exam.specification import Anchor, ExamCorridor, References, Specification, tables
 from rigdda.envs import CorridorProblem, DesignProblem
+from rigdda.seeds import release_seeds
 
 CHOICE, VALUE = 0.1, 0.2
 """Releases for the choice of the reference and for its value, over those of its search [-]."""

@@ -23,8 +23,17 @@ from rigdda.agents.learning import forecasts
 from rigdda.agents.learning.relative_layouts import candidates
 from rigdda.envs import forecast_table
 
-TRAIN, VALIDATION, TEST = 96, 12, 30
+TRAIN, VALIDATION, TEST = 72, 18, 18
 """Default numbers of sites of each split."""
+WORK = Path("runs/known_forecasts")
+"""Default working folder."""
+
+
+def folder_of(work: Path) -> Path:
+    """Return the folder for forecasts of this version of the mechanics, which is created."""
+    folder = work / f"mechanics-{MECHANICS}"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 @click.command(help=__doc__)
@@ -36,25 +45,25 @@ TRAIN, VALIDATION, TEST = 96, 12, 30
               help="Number of test sites.")  # fmt: skip
 @click.option("--layouts", type=click.IntRange(2), default=forecasts.LAYOUTS, show_default=True,
               help="Number of layouts of the catalogue.")  # fmt: skip
-@click.option("--work", type=click.Path(path_type=Path), default=Path("runs/known_forecasts"),
+@click.option("--work", type=click.Path(path_type=Path), default=WORK,
               show_default=True, help="Working folder.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path), default=forecast_table.SHIPPED,
               show_default=True, help="The file.")  # fmt: skip
 def main(train: int, validation: int, test: int, layouts: int, work: Path, out: Path) -> None:
     """Compute and write the file."""
     counts = {"train": train, "validation": validation, "test": test}
-    names = [name for split, count in counts.items() for name in sites.split(split)[:count]]
+    names = [
+        name for split, count in counts.items() for name in sites.split(f"wide-{split}")[:count]
+    ]
     catalogue = candidates()
-    folder = work / f"mechanics-{MECHANICS}"
-    folder.mkdir(parents=True, exist_ok=True)
-    found = forecasts.collect(names, catalogue, folder, lambda i, name: say(f"{i} {name}"))
-    z = np.array([own.z for own in found[:train]])
+    found = forecasts.collect(names, catalogue, folder_of(work), lambda i, name: say(f"{i} {name}"))
+    z = np.array([own.z for name, own in found.items() if sites.part_of(name) == "train"])
     kept = forecasts.choose(z, catalogue, layouts)
     command = f"python -m experiments.known_forecasts --train {train} --validation {validation}"
     notes = {"command": f"{command} --test {test} --layouts {layouts}"}
-    forecasts.table(names, found, catalogue, kept, notes).save(out)
+    forecasts.table(found, catalogue, kept, notes).save(out)
     whole, own = (np.nanmin(z[:, some], axis=1).mean() for some in (slice(None), kept))
-    say(f"{len(names)} sites, {out.stat().st_size / 1e3:.0f} kB")
+    say(f"{len(found)} sites, {out.stat().st_size / 1e3:.0f} kB")
     say("mean of the least forecast Z over Z without barriers on the training sites:")
     say(f"{whole:.3f} of all candidates, {own:.3f} of the catalogue")
 

@@ -33,7 +33,7 @@ SPLITS = ("validation", "test")
 EXAM = specification.load()
 ALWAYS = (
     "quick",
-    *sites.design_names(),
+    *dict.fromkeys((*sites.design_names(), *sites.WIDE_FAMILIES)),
     *EXAM.sites,
     *(name for corridor in EXAM.corridors for name in corridor.sites),
 )
@@ -42,7 +42,7 @@ ALWAYS = (
 
 @click.command(help=__doc__)
 @click.option("--split", "splits", multiple=True, default=SPLITS, show_default=True,
-              type=click.Choice(tuple(sites.SPLITS)), help="May be repeated.")  # fmt: skip
+              type=click.Choice(sites.SPLITS), help="May be repeated.")  # fmt: skip
 @click.option("--sites", "count", type=click.IntRange(1), default=60, show_default=True,
               help="Number of sites of each split.")  # fmt: skip
 @click.option("--checked", type=click.IntRange(0), default=6, show_default=True,

@@ -24,8 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.script import Number, folder, options, say, write
-from rigdda.app.exam import ranking, scorer, specification
-from rigdda.app.exam.scorer import ExamPart, Scorer
+from rigdda.app.exam import ranking, specification
+from rigdda.app.exam.scorer import Scorer
+from rigdda.app.exam.specification import ExamPart
 
 MODULE = "rigdda.app.exam.entries"
 
@@ -54,7 +55,11 @@ KEPT = (
 def asked(quick: bool, budget: int) -> ExamPart:
     """Return the exam with one budget, or a small part of it."""
     spec = specification.load()
-    return scorer.part(spec, 2, 0, (budget,), 40) if quick else scorer.part(spec, budgets=(budget,))
+    return (
+        specification.part(spec, 2, 0, (budget,), 40)
+        if quick
+        else specification.part(spec, budgets=(budget,))
+    )
 
 
 def entries(budget: int) -> Sequence[str]:
@@ -68,15 +73,14 @@ def exam_of(name: str, part: ExamPart, work: Path) -> Scorer:
     references = specification.references(spec)
     own = work / name
     own.mkdir(parents=True, exist_ok=True)
-    secrets = (specification.file_of_references(spec),)
-    job = Scorer(part, references, f"{MODULE}:{name}", "", own, secrets)
+    job = Scorer(part, references, f"{MODULE}:{name}", "", own)
     job.play()
     return job
 
 
 def rows_of(name: str, job: Scorer) -> list[dict[str, Any]]:
     """Return the rows of an entry."""
-    scorer.check_references(job.asked, job.references)
+    specification.check_references(job.asked, job.references)
     budget = job.asked.budgets[0]
     command = f"rigdda exam --entry {MODULE}:{name} --budget {budget}"
     return [

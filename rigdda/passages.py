@@ -1,7 +1,8 @@
 """Passages of blocks at stations, and the places where blocks stop.
 
 The state of a block at a station is that of the first step at which its centroid is at or beyond
-the station. Nothing depends on the interval of recorded frames.
+the station. Nothing depends on the interval of recorded frames. The motion is that of
+`rigdda.releases.Batch`; `rigdda.releases` describes the ways in which releases are computed.
 """
 
 from __future__ import annotations

@@ -1,8 +1,18 @@
 """Releases: simulations of a site with a layout for one seed or many.
 
-Releases of one site with one layout share everything that does not depend on the seed. Most of them
-are of a single block, whose descent is computed in less than a millisecond; for these, the ground,
-the positions of barriers and the interface properties are prepared once.
+The descent of a release is computed in one of three ways, which give the same outcomes bit for bit
+(`tests/reliability/test_single_blocks.py`):
+
+- `simulation` packs a scene of its own. `release` uses it, because it returns the frames of a run.
+- `Batch` computes many releases of one site with one layout, which share everything that does not
+  depend on the seed. With several blocks, it resets the arrays of a
+  `rigdda.dynamics.template.Template` instead of packing a scene.
+- `SingleReleases` computes releases of a single block for a `Batch`, where `can_share` allows it.
+  They need no scene at all, see `rigdda.dynamics.single_block`. Most releases are of this kind and
+  take less than a millisecond.
+
+`rigdda.trajectory` and `rigdda.passages` have no way of their own: both read the motion of a
+`Batch`, the first in every step (`StepRecord`) and the second at stations.
 """
 
 from __future__ import annotations
@@ -51,7 +61,7 @@ from rigdda.measurement import (
     steepest_deposit,
     watch,
 )
-from rigdda.model.interfaces import Meetings
+from rigdda.model.interfaces import ContactProperties
 from rigdda.model.outcome import Outcome
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step_of_single
@@ -106,7 +116,7 @@ class SingleReleases:
     def __init__(self, site: Site, layout: list[Built], scene: Scene):
         self._site, self._layout, self._scene = site, layout, scene
         names = list(scene.surfaces)
-        self._meetings = Meetings(site)
+        self._properties = ContactProperties(site)
         self._gravity = -scene.gravity_vector[1]
         self._lines = stations(site, scene.barriers)
         self._leave = leave(site, scene)
@@ -136,8 +146,8 @@ class SingleReleases:
         (block,) = drawn.blocks
         if block.fixed or len(block.vertices) > MOST_CORNERS:
             return None
-        site, meetings = self._site, self._meetings
-        meetings.draw(drawn)
+        site, properties = self._site, self._properties
+        properties.draw(drawn)
         area = polygon_properties(block.vertices)[0]
         most = longest_step_of_single(area, self._gravity)
         dt = site.motion.dt / max(1, math.ceil(site.motion.dt / most))
@@ -155,7 +165,7 @@ class SingleReleases:
             for bears, barrier in zip(resistances, barriers, strict=True)
         ]
         steps = max(1, round(site.motion.duration / dt))
-        found = arrays.run(block, meetings, forces, limits, drawn.stems, steps, record)
+        found = arrays.run(block, properties, forces, limits, drawn.stems, steps, record)
         if found is None:
             return None
         return self._ending(found, area, block.density, barriers, resistances)
@@ -173,7 +183,7 @@ class SingleReleases:
         standing = self._standing[index]
         if not isinstance(barrier, Embankment):
             return barrier.resistance(self._scene, NEVER)
-        friction = min(float(self._meetings.friction_deg[pair]) for pair in standing.base)
+        friction = min(float(self._properties.friction_deg[pair]) for pair in standing.base)
         return sliding_resistance(self._gravity, barrier.density, standing.area, friction)
 
     def _ending(
@@ -186,7 +196,7 @@ class SingleReleases:
     ) -> Ending:
         """Return how a release ended, from the results of its block and the resistances."""
         log = log_of(found.events, len(barriers), 1, self._lines)
-        rise = steepest_deposit([self._meetings.least_friction_deg])
+        rise = steepest_deposit([self._properties.least_friction_deg])
         moved = [0.0] * len(barriers)
         for i, way in zip(self._scene.bodies, found.moved, strict=True):
             moved[i] = way

@@ -2,7 +2,8 @@
 
 `trajectories` gives the outcomes of `rigdda.release_many` and, in addition, the paths of all blocks
 in flat arrays. A path keeps only the points that a drawing needs: straight lines between them are
-within a tolerance of the states after every step.
+within a tolerance of the states after every step. The motion is that of `rigdda.releases.Batch`;
+`rigdda.releases` describes the ways in which releases are computed.
 """
 
 from __future__ import annotations

@@ -17,7 +17,8 @@ from rigdda.agents import designers
 from rigdda.agents.designers.menu import Menu
 from rigdda.app.reports import findings
 from rigdda.app.reports.wording import before, order, unchanged
-from rigdda.app.site_check import facts, oddities
+from rigdda.app.site_check import facts
+from rigdda.app.site_oddities import oddities
 from rigdda.barriers import Removal
 from rigdda.barriers.fence import WornFence
 from rigdda.envs import DesignProblem

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rigdda.app.reports import html_blocks
 from rigdda.app.reports.corridor_report import thousands
-from rigdda.app.reports.html_report import EXHIBITS
+from rigdda.app.reports.report_contents import EXHIBITS
 from rigdda.app.reports.tables import bounded, risk_table
 from rigdda.app.reports.wording import at_most, euros, figure, percent, small, span, tenth
 from rigdda.envs.cost import Risk

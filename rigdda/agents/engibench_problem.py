@@ -22,8 +22,8 @@ from matplotlib.figure import Figure
 
 from rigdda import display
 from rigdda.agents import designers
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.envs import DesignProblem
+from rigdda.seeds import release_seeds
 
 DEFAULT_SITE = "narrow-2000000003"
 """Site of a problem without a configuration: the cheapest family to simulate."""

@@ -39,10 +39,12 @@ from rigdda.envs import DesignProblem, forecast_table
 from rigdda.envs.envelope import largest
 from rigdda.envs.forecast_table import ForecastTable
 from rigdda.files import atomic
-from rigdda.model.site_names import built_in, instance
 
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]
+
+TRAIN, VALIDATION = "wide-train", "wide-validation"
+"""Splits of the sites of a new table and of the comparison."""
 
 ALGORITHMS = ("gradient", "ppo")
 """Algorithms for learning on forecasts, see `rigdda.agents.learning`."""
@@ -85,7 +87,7 @@ class Terms:
 
     def __post_init__(self) -> None:
         if self.sites:
-            check.integer("sites", self.sites, 2, len(sites.split("train")))
+            check.integer("sites", self.sites, 2, len(sites.split(TRAIN)))
         check.one_of("algorithm", self.algorithm, ALGORITHMS)
         check.integer("simulate", self.simulate, 0, forecasts.LAYOUTS)
         check.integer("seed", self.seed, 0, limits.SEED)
@@ -163,11 +165,12 @@ def table_of(terms: Terms, out: Path, tick: Tick) -> ForecastTable:
         return table
     folder, catalogue = out / "sites", candidates()
     folder.mkdir(parents=True, exist_ok=True)
-    names = sites.split("train")[: terms.sites]
+    names = sites.split(TRAIN)[: terms.sites]
     found = forecasts.collect(names, catalogue, folder, tick)
-    kept = forecasts.choose(np.array([own.z for own in found]), catalogue, forecasts.LAYOUTS)
+    z = np.array([own.z for own in found.values()])
+    kept = forecasts.choose(z, catalogue, forecasts.LAYOUTS)
     notes = {"command": f"rigdda train --sites {terms.sites}"}
-    table = forecasts.table(names, found, catalogue, kept, notes)
+    table = forecasts.table(found, catalogue, kept, notes)
     table.save(out / "forecasts.safetensors")
     return ForecastTable.load(out / "forecasts.safetensors")  # rounded as in the file
 
@@ -227,11 +230,6 @@ def _agree(asked: dict[str, Any], out: Path) -> None:
         part.write_bytes(msgspec.json.encode(asked))
 
 
-def family_of(name: str) -> str:
-    """Return the family of a generated site."""
-    return built_in(*instance(name))
-
-
 def best_of_families(table: ForecastTable) -> dict[str, list[int]]:
     """Return for each family the catalogue in the order of mean forecast Z on its training sites.
 
@@ -239,7 +237,7 @@ def best_of_families(table: ForecastTable) -> dict[str, list[int]]:
     numbers in the catalogue, the best first.
     """
     rows = table.rows("train")
-    families = np.array([family_of(table.names[row]) for row in rows])
+    families = np.array([sites.family_of(table.names[row]) for row in rows])
     reward = table.reward[rows]
     return {
         name: np.argsort(-reward[families == name].mean(axis=0), kind="stable").tolist()
@@ -254,7 +252,7 @@ def methods(policy: Policy, table: ForecastTable, problem: DesignProblem) -> dic
     that can be built (`best_of_families`), which is told the family of the site.
     """
     menu = Menu(problem)
-    order = best_of_families(table).get(family_of(problem.site.name), [0])
+    order = best_of_families(table).get(sites.family_of(problem.site.name), [0])
     family = (placed(menu, table.layouts[i]) for i in order)
     found = {
         "nothing": (),
@@ -292,7 +290,7 @@ def compare(
         If a simulation diverges.
     """
     table, store = table_of(terms, out, tick), Store(out / "evaluations.jsonl")
-    return compared(policy, table, sites.split("validation")[:count], releases, store, tick)
+    return compared(policy, table, sites.split(VALIDATION)[:count], releases, store, tick)
 
 
 def compared(

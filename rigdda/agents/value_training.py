@@ -23,19 +23,18 @@ from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.forecast import Forecast, forecast_seeds
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.race import joined
 from rigdda.agents.network import Network, scaling
 from rigdda.agents.run_record import check_terms
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
 from rigdda.files import atomic
+from rigdda.model.site_names import TRAINING_SPLIT
+from rigdda.seeds import release_seeds
 
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]
 
-SPLIT = "train"
-"""Split with the sites for training."""
 FEW = 6
 """Number of releases of each event to which an ensemble is reduced for a second set of features, as
 with a small budget."""
@@ -74,7 +73,7 @@ class ValueTerms:
     seed: int
 
     def __post_init__(self) -> None:
-        check.integer("sites", self.sites, 2, len(sites.split(SPLIT)))
+        check.integer("sites", self.sites, 2, len(sites.split(TRAINING_SPLIT)))
         check.integer("seed", self.seed, 0, limits.SEED)
 
 
@@ -130,7 +129,7 @@ def train(terms: ValueTerms, out: Path, tick: Tick) -> Network:
     """
     _agree(terms, out)
     found = []
-    for i, name in enumerate(sites.split(SPLIT)[: terms.sites]):
+    for i, name in enumerate(sites.split(TRAINING_SPLIT)[: terms.sites]):
         tick(i, name)
         path = out / f"{name}.npz"
         if not path.is_file():

@@ -25,7 +25,6 @@ from pyarrow import parquet
 from rigdda import MECHANICS, BadInput, Layout, Outcome, __version__, check, distribution, sites
 from rigdda.agents.designers.constant import CONSTANTS, place
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.limits import JOB_RELEASES, SEED
 from rigdda.agents.network import features
 from rigdda.agents.run_record import check_terms
@@ -33,6 +32,7 @@ from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem
 from rigdda.envs.observation import observe
 from rigdda.files import atomic
+from rigdda.seeds import derive, release_seeds
 
 Tick = Callable[[int, str], None]
 
@@ -91,8 +91,8 @@ class Recipe:
 
     Parameters
     ----------
-    split : {"train", "validation", "test"}
-        Split of the sites.
+    split : str
+        Split of the sites, see `rigdda.sites.split`.
     layouts : int
         Number of layouts of each site.
     releases : int
@@ -110,7 +110,7 @@ class Recipe:
     max_barriers: int = 3
 
     def __post_init__(self) -> None:
-        check.one_of("split", self.split, ("train", "validation", "test"))
+        check.one_of("split", self.split, sites.SPLITS)
         check.integer("layouts", self.layouts, 1, JOB_RELEASES)
         check.integer("releases", self.releases, 1, JOB_RELEASES)
         check.integer("seed", self.seed, 0, SEED)
@@ -203,7 +203,7 @@ def _check_folder(recipe: Recipe, folder: Path) -> None:
 def part(recipe: Recipe, name: str) -> tuple[bytes, bytes]:
     """Return the Parquet files of the outcomes of a site and of its row of the sites."""
     problem = DesignProblem(name, recipe.max_barriers)
-    own = int(np.random.SeedSequence([recipe.seed, *name.encode()]).generate_state(1)[0])
+    own = derive(recipe.seed, *name.encode())
     seeds = release_seeds("search", own, recipe.releases)
     rows: list[dict[str, Any]] = []
     for i, (origin, layout) in enumerate(layouts(problem, recipe.layouts, own)):

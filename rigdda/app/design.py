@@ -216,8 +216,9 @@ def _verified(
             tick(begun + i * n, f"verifying: {case}")
             cases.append(VerifiedLayout(case, verification.evaluate(layout, stage)))
         tell(cases)
-        evaluations = [case.evaluation for case in cases]
-        if precision > 0.0 and verification.decided(evaluations, precision):
+        # the layout without checks cannot be built and is therefore no alternative
+        choices = [case.evaluation for case in cases if case.name != WITHOUT_CHECKS]
+        if precision > 0.0 and verification.decided(choices, precision):
             break
     return cases
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from rigdda import Layout, Site
 from rigdda.agents.designers import constant, rule
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.app.reports.tables import empty_table, write_rows
 from rigdda.app.reports.wording import euros, span, unchanged
 from rigdda.envs import DesignProblem, Evaluation, problem
 from rigdda.envs.cost import Interval
+from rigdda.seeds import release_seeds
 
 if TYPE_CHECKING:
     from rich.table import Table

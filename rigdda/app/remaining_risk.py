@@ -9,15 +9,11 @@ import numpy as np
 from rigdda import Barrier, Layout
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import (
-    release_seeds,
-)
-from rigdda.app.design_study import (
-    design_events,
-)
+from rigdda.app.design_study import design_events
 from rigdda.app.reports import findings
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.geometry import polygon_properties
+from rigdda.seeds import release_seeds
 
 STATIONS = 3
 """Number of places in the zone where each kind is tried; the last one is near the road."""

@@ -24,7 +24,7 @@ import numpy as np
 
 from rigdda import BadInput, Layout, Outcome, Site, fields
 from rigdda.agents.designers.frontier import TriedLayout, frontier, worst
-from rigdda.agents.designers.protocol import CHOICE_STREAM, STREAMS, End, of_chance, of_mean
+from rigdda.agents.designers.protocol import CHOICE_STREAM, End, of_chance, of_mean
 from rigdda.app import archive
 from rigdda.app.archive import Archive
 from rigdda.app.design_study import ComparedLayouts, VerifiedLayout
@@ -34,6 +34,7 @@ from rigdda.envs.ensemble import Ensemble, statistics
 from rigdda.envs.intervals import Estimate, Mean, estimate
 from rigdda.envs.outcome_cache import NO_EVENT_MOTION, NO_MOTION
 from rigdda.envs.problem import MISSED, Targets, excess, read_targets
+from rigdda.seeds import is_of_stream
 
 BEST_OF_SEARCH = "best of search"
 """Name of the layout that is best for the new values."""
@@ -395,7 +396,7 @@ def judged(problem: DesignProblem, candidate: ScoredLayout, kept: Archive) -> Ev
     )
 
 
-VERIFIED = (STREAMS.index("verification"), STREAMS.index(CHOICE_STREAM))
+VERIFIED = ("verification", CHOICE_STREAM)
 """Streams of releases that no search used, the one of the table of the design first."""
 
 
@@ -409,7 +410,7 @@ def _candidates(problem: ArchivedProblem, kept: Archive) -> dict[Layout, ScoredL
     for releases in kept.releases:
         layout = archive.layout_of(releases.barriers)
         pairs = list(zip(releases.seeds, releases.outcomes, strict=True))
-        streams = [[o for seed, o in pairs if seed % len(STREAMS) == k] for k in VERIFIED]
+        streams = [[o for seed, o in pairs if is_of_stream(seed, s)] for s in VERIFIED]
         checked = next(filter(None, streams), [])
         outcomes = tuple(checked or releases.outcomes)
         candidates[layout] = _candidate(problem, layout, outcomes, bool(checked), spent)

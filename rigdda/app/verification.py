@@ -11,11 +11,11 @@ from dataclasses import replace
 from statistics import NormalDist
 
 from rigdda import Layout, Outcome
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem, Evaluation, ensemble
 from rigdda.envs.comparison import Difference, difference
 from rigdda.envs.intervals import CONFIDENCE
+from rigdda.seeds import release_seeds
 
 LEAST = 100
 """Least number of releases of a layout after which a verification may end. With fewer, intervals of
@@ -118,8 +118,8 @@ class Verification:
         Parameters
         ----------
         evaluations : sequence of Evaluation
-            Evaluations of layouts on all their releases, which are the same for all. No barrier is
-            the first and the recommended layout is the last.
+            Evaluations of the layouts that may be built, on all their releases, which are the same
+            for all. No barrier is the first and the recommended layout is the last.
         precision : float
             Half of the width of an interval over Z [-].
         """
@@ -131,24 +131,24 @@ class Verification:
             return False
         others = [e.layout for e in evaluations if e.layout != last.layout]
         found = [self.difference(last.layout, other) for other in others]
-        return all(clear(one, exact, len(self.stages)) for one in found)
+        return all(is_clear(one, exact, len(self.stages)) for one in found)
 
 
-def clear(found: Difference, exact: float, looks: int) -> bool:
-    """Return whether the first layout is dearer, or not dearer by more than `exact`.
+def is_clear(found: Difference, tolerance: float, comparisons: int) -> bool:
+    """Return whether one layout costs more than another, or at most `tolerance` more.
 
     Parameters
     ----------
     found : Difference
         Z of the first layout minus Z of the second.
-    exact : float
-        Loss that does not matter [EUR per metre and year].
-    looks : int
-        Number of times that the question is asked during a verification. The interval is widened,
-        so that the probability of an error in any of them is that of one interval (Bonferroni).
+    tolerance : float
+        Difference that does not matter [EUR per metre and year].
+    comparisons : int
+        Number of interim analyses in which both layouts are compared. The interval is widened, so
+        that the probability of an error in any of them is that of one interval (Bonferroni).
     """
     error = (1.0 - CONFIDENCE) / 2.0
     normal = NormalDist().inv_cdf
-    wider = normal(1.0 - error / looks) / normal(1.0 - error)
+    wider = normal(1.0 - error / comparisons) / normal(1.0 - error)
     low, high = (found.value + wider * (end - found.value) for end in found.ci)
-    return low > 0.0 or high <= exact
+    return low > 0.0 or high <= tolerance

@@ -1,4 +1,8 @@
-"""Flexible rockfall fence."""
+"""Flexible rockfall fence: its shape, price and catalogue.
+
+Its motion and the energy that it absorbs are in `rigdda.dynamics.fence_brakes`; that energy is
+accounted in `rigdda.dynamics.yielding_fences` and `rigdda.dynamics.island_step`.
+"""
 
 from __future__ import annotations
 

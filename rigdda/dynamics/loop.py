@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda.dynamics.arrays import GroundArrays, Totals, World
+from rigdda.dynamics.arrays import Totals, World
 from rigdda.dynamics.constants import (
     ASLEEP,
     AWAKE,
@@ -27,16 +26,10 @@ from rigdda.dynamics.records import CONTACTS, COUNTERS, EVENTS, LEDGER, STEPS, C
 from rigdda.dynamics.step import advance
 from rigdda.errors import Diverged
 from rigdda.kernel import Direct
-from rigdda.model.scene import Scene, Terrain
+from rigdda.model.scene import Scene
 
 advance_directly = Direct(advance)
 """The step loop without type dispatch: the types of its arrays are the same for every scene."""
-
-
-@lru_cache(maxsize=16)
-def _packed_ground(ground: Terrain | None, names: tuple[str, ...]) -> GroundArrays:
-    """Return the packed ground; cached because the releases of a site share it unchanged."""
-    return pack_ground(ground, list(names))
 
 
 class Loop:
@@ -166,8 +159,8 @@ class Loop:
         """Remove embankments that were pushed away from the ground, and wake all bodies."""
         failed = self.events()
         gone = failed["target"][failed["kind"] == FAILED]
-        left, names = self._scene.ground_without(gone), tuple(self._scene.surfaces)
-        ground = _packed_ground(left, names)
+        left = self._scene.ground_without(gone)
+        ground = pack_ground(left, list(self._scene.surfaces))
         self.arrays = self.arrays._replace(ground=ground)
         bodies, contacts = self.arrays.bodies, self.now
         bodies["quiet"][bodies["status"] == ASLEEP] = 0.0

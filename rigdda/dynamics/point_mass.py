@@ -83,7 +83,7 @@ def fly(ground: Floats, p: Floats, s: int, g: float) -> tuple[float, int]:
 
 
 @kernel
-def watch(
+def record_passage(
     ground: Floats, p: Floats, time: float, ax: float, ay: float, line: float, found: Floats
 ) -> None:
     """Record speed and height where a point first passes a chainage within a time."""
@@ -139,13 +139,13 @@ def slide(
     rest, v = (length - here if way > 0.0 else here), abs(speed)
     if v * v + 2.0 * gain * rest <= 0.0:
         time = -v / gain  # it comes to rest and may slide back
-        watch(ground, p, time, way * gain * tx, way * gain * ty, line, found)
+        record_passage(ground, p, time, way * gain * tx, way * gain * ty, line, found)
         advance(p, time, way * gain * tx, way * gain * ty)
         p[VX] = p[VY] = 0.0
         return abs(pull) <= drag, s
     after = math.sqrt(v * v + 2.0 * gain * rest)
     time = 2.0 * rest / (v + after) if rest > 0.0 else 0.0
-    watch(ground, p, time, way * gain * tx, way * gain * ty, line, found)
+    record_passage(ground, p, time, way * gain * tx, way * gain * ty, line, found)
     corner = s + 1 if way > 0.0 else s
     p[X], p[Y] = ground[corner, 0], ground[corner, 1]
     p[VX], p[VY] = way * after * tx, way * after * ty
@@ -168,7 +168,7 @@ def follow(ground: Floats, laws: Floats, p: Floats, g: float, line: float, found
             s = after
         else:
             time, met = fly(ground, p, s, g)
-            watch(ground, p, time, 0.0, -g, line, found)
+            record_passage(ground, p, time, 0.0, -g, line, found)
             if met < 0:
                 p[X] = ground[0, 0] if p[VX] < 0.0 else ground[len(ground) - 1, 0]
                 break

@@ -3,7 +3,8 @@
 Describing a block and its surroundings in Python takes as long as simulating its descent. Here,
 kernels write the block and the interface properties into the arrays of a similar scene and read the
 results. All entries that are used are bit-identical to those that `rigdda.dynamics.packing.pack`
-gives for a scene of that block.
+gives for a scene of that block. This is one of the three ways in which releases are computed, see
+`rigdda.releases`.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from rigdda.errors import Diverged
 from rigdda.geometry import is_sound
 from rigdda.kernel import Direct, kernel, short_kernel
 from rigdda.model.block import Block
-from rigdda.model.interfaces import Meetings
+from rigdda.model.interfaces import ContactProperties
 from rigdda.model.overlap import surely_on_ground
 from rigdda.model.scene import Scene
 from rigdda.model.settings import EARTH, Settings
@@ -73,7 +74,7 @@ class SingleArrays(NamedTuple):
 
 
 class PairProperties(NamedTuple):
-    """Properties of each pair of surfaces of a site, see `Meetings`; (n, n) each."""
+    """Properties of each pair of surfaces of a site, see `ContactProperties`; (n, n) each."""
 
     friction_deg: NDArray
     restitution: NDArray
@@ -266,7 +267,7 @@ class SingleBlock:
     def run(
         self,
         block: Block,
-        meetings: Meetings,
+        properties: ContactProperties,
         forces: Sequence[float],
         limits: Sequence[float],
         stems: Stemmed,
@@ -279,7 +280,7 @@ class SingleBlock:
         ----------
         block : Block
             The block, with at most `MOST_CORNERS` corners.
-        meetings : Meetings
+        properties : ContactProperties
             Properties of each pair of surfaces.
         forces : sequence of float
             Braking force of each fence, in the order of the bodies [N/m].
@@ -313,10 +314,10 @@ class SingleBlock:
             self._traits,
             self._around,
             PairProperties(
-                meetings.friction_deg,
-                meetings.restitution,
-                meetings.rolling,
-                meetings.restitution_speed,
+                properties.friction_deg,
+                properties.restitution,
+                properties.rolling,
+                properties.restitution_speed,
             ),
             self._written,
         )

@@ -41,7 +41,7 @@ def wake_neighbours(bodies: Bodies, pairs: Ints, count: int, blocks: int) -> int
 
 
 @kernel
-def watch_quiet(bodies: Bodies, islands: Islands, count: int, p: Parameters) -> None:
+def update_quiet_time(bodies: Bodies, islands: Islands, count: int, p: Parameters) -> None:
     """Update how long blocks have been quiet, and put islands to sleep in which all blocks are.
 
     A block that accelerates is not quiet, because it has begun to slide or fall.

@@ -34,7 +34,7 @@ from rigdda.dynamics.records import (
     Shaking,
 )
 from rigdda.dynamics.shaking import set_field
-from rigdda.dynamics.sleep import watch_quiet
+from rigdda.dynamics.sleep import update_quiet_time
 from rigdda.dynamics.stems import meet_stems
 from rigdda.kernel import entry_kernel, kernel, stage, variable
 
@@ -51,7 +51,7 @@ def solve_and_move(
         worse = step_island(world, contacts, work, monitors, time, s, p, totals)
         bad = max(bad, worse)
     if p.sleeping:
-        watch_quiet(world.bodies, work.islands, found, p)
+        update_quiet_time(world.bodies, work.islands, found, p)
     return bad
 
 

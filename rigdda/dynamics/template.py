@@ -1,4 +1,7 @@
-"""Reusable arrays for scenes that differ only in rock, strength and ground elevations."""
+"""Reusable arrays for scenes that differ only in rock, strength and ground elevations.
+
+This is one of the three ways in which releases are computed, see `rigdda.releases`.
+"""
 
 from __future__ import annotations
 

@@ -25,7 +25,6 @@ from rigdda.envs import encoding, observation
 from rigdda.envs.cost import Evaluation
 from rigdda.envs.environments import (
     COSTS_IN_INFO,
-    SCORED_SEEDS,
     Action,
     Answer,
     Ask,
@@ -44,6 +43,7 @@ from rigdda.envs.replay_record import release_record
 from rigdda.envs.site_sampling import EpisodeSites, Place, Places, drawn_from
 from rigdda.model.corridor import is_corridor
 from rigdda.model.corridor import names as corridor_names
+from rigdda.seeds import EPISODES
 
 DEFAULT_SECTIONS = 12
 """Default number of sections of an episode."""
@@ -122,7 +122,7 @@ class CorridorDesign(LayoutEnv):
     Parameters
     ----------
     site : str, path, Site, Corridor or sequence of sites
-        Where sections come from: a split of the generated sites ("train", "validation", "test"), a
+        Where sections come from: a split of the generated sites (see `rigdda.sites.split`), a
         site or a sequence of sites, from which `sections` are drawn without repetition, or a
         corridor (also its name or file), whose sections are all taken. Targets of its sections
         are not used.
@@ -258,7 +258,7 @@ class CorridorDesign(LayoutEnv):
         )
         self.budget = each * total
         self._seeds = [
-            tuple(rng.integers(SCORED_SEEDS, size=self.releases).tolist()) for _ in self.placed
+            tuple(rng.integers(EPISODES, size=self.releases).tolist()) for _ in self.placed
         ]
 
     def _drawn(self, rng: np.random.Generator) -> tuple[PlacedSection, ...]:

@@ -448,20 +448,22 @@ def _weighted(
     )
     often = {name: rate[name] * fact.reached / fact.releases for name, fact in facts.items()}
     seen = {n: float((found.event == n).mean()) / shares[n] for n in often}
-    dear = {n: (1.0 - seen[n]) * often[n] * facts[n].harm.mean for n in often}
-    much = math.fsum((1.0 - seen[n]) * often[n] * facts[n].volume.mean for n in often)
+    unseen_harm = {n: (1.0 - seen[n]) * often[n] * facts[n].harm.mean for n in often}
+    unseen_volume = math.fsum((1.0 - seen[n]) * often[n] * facts[n].volume.mean for n in often)
     spent = drawn.harm + drawn.repair
     by_event = {
-        n: float(spent[found.event == n].sum() / len(spent)) + dear.get(n, 0.0)
+        n: float(spent[found.event == n].sum() / len(spent)) + unseen_harm.get(n, 0.0)
         for n in site.event_names
     }
-    more = math.fsum(dear.values())
+    correction = math.fsum(unseen_harm.values())
     tolls = []
     for j, mean in enumerate(toll_means(drawn, mixed)):
-        lack = math.fsum((1.0 - seen[n]) * often[n] * facts[n].toll[j].mean for n in often)
-        tolls.append(mean.moved(lack))
-    both = both.moved(more)
-    return Sums(harm.moved(more), repair, both, volume.moved(much), by_event, tuple(tolls))
+        unseen_toll = math.fsum((1.0 - seen[n]) * often[n] * facts[n].toll[j].mean for n in often)
+        tolls.append(mean.moved(unseen_toll))
+    both = both.moved(correction)
+    return Sums(
+        harm.moved(correction), repair, both, volume.moved(unseen_volume), by_event, tuple(tolls)
+    )
 
 
 def _mixture(

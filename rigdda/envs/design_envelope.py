@@ -29,6 +29,7 @@ from rigdda.envs.quantiles import BlockSample, Quantile, quantiles
 from rigdda.geometry import polygon_properties
 from rigdda.ground.barrier_zone import BarrierZone
 from rigdda.passages import Passages, passages
+from rigdda.seeds import design_envelope_seed
 
 Floats = NDArray[np.float64]
 
@@ -42,9 +43,6 @@ SPACING, MOST_STATIONS = 1.0, 100
 BANDWIDTH = 2.0
 """Distance at which the weight of another station in the regression is 0, in units of the distance
 between stations."""
-
-FIRST_SEED = 2**34
-"""First seed of the releases; episodes, envelopes and ensembles use smaller ones."""
 
 
 class DesignEnvelope(msgspec.Struct, frozen=True):
@@ -178,7 +176,7 @@ def _simulate(
     at = [*lines, site.road.start] if lines[-1] < site.road.start else lines
     events, through, reached = [], np.zeros(len(lines)), 0
     for name in governing_events(site):
-        first = FIRST_SEED + seed * 2**20
+        first = design_envelope_seed(seed)
         releases = [(first + i, name) for i in range(math.ceil(blocks / largest(site, name)))]
         crossed = passages(site, layout, releases, at)
         while len(crossed.stops) < blocks:  # events with a random number of blocks

@@ -20,15 +20,12 @@ from rigdda.envs import outcome_cache, site_store
 from rigdda.envs.cost import Evaluation, Facts, account, judge, learn
 from rigdda.envs.outcome_cache import Memory
 from rigdda.releases import check_duration
-
-FIRST_SEED = 2**33
-"""First seed of the releases used for barrier-free statistics. Episodes use seeds below 2**31, and
-envelopes use seeds from 2**32."""
+from rigdda.seeds import NO_BARRIERS
 
 FIRST_ROUND, BOTH_ROUNDS = 32, 2048
 """Number of releases of each event in the first round, and total number in both rounds together."""
 
-FIRST_SEEDS = range(FIRST_SEED, FIRST_SEED + FIRST_ROUND)
+FIRST_SEEDS = range(NO_BARRIERS, NO_BARRIERS + FIRST_ROUND)
 """Seeds of the first round."""
 
 LEAST_EVENT_SHARE = 0.2
@@ -145,7 +142,8 @@ def bare_outcomes(
     site : Site
         The site, with its existing barriers.
     counts : mapping of str to int
-        Number of releases of each event; their seeds begin at `FIRST_SEED`.
+        Number of releases of each event; their seeds begin at
+        `rigdda.seeds.NO_BARRIERS`.
     executor : Executor, optional
         Where to run the simulations; by default in threads on all cores.
 
@@ -163,7 +161,7 @@ def bare_outcomes(
     stored = _joined(known)
     check_duration([site] * len(stored), stored)
     jobs = [
-        (site, (), FIRST_SEED + i, name)
+        (site, (), NO_BARRIERS + i, name)
         for name, count in counts.items()
         for i in range(len(known[name]), count)
     ]

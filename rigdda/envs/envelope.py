@@ -16,6 +16,7 @@ from rigdda import Run, Simulation, Site
 from rigdda.envs import site_store
 from rigdda.envs.outcome_cache import Memory, fingerprint
 from rigdda.geometry import polygon_properties
+from rigdda.seeds import OBSERVATIONS
 
 Floats = NDArray[np.float64]
 
@@ -32,9 +33,6 @@ basis for the design of barriers."""
 
 EVENT_CLASSES = ("single blocks", "groups")
 """Classes of events: blocks that fall alone, and blocks that interact with each other."""
-
-FIRST_SEED = 2**32
-"""First seed of the releases used for envelopes; environments use seeds below 2**31 for scoring."""
 
 BLOCKS_PER_EVENT, LEAST_RELEASES = 16, 2
 """Number of blocks simulated for each event, and minimum number of its releases."""
@@ -172,7 +170,7 @@ def _jobs(site: Site) -> list[Job]:
         for name in site.event_names
     }
     return [
-        (site, (), FIRST_SEED + i, name) for name, count in counts.items() for i in range(count)
+        (site, (), OBSERVATIONS + i, name) for name, count in counts.items() for i in range(count)
     ]
 
 

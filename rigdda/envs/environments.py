@@ -22,13 +22,14 @@ import rigdda
 from rigdda import BadInput, Layout, Outcome, Run, check
 from rigdda.envs import encoding, observation, outcome_cache
 from rigdda.envs.cost import Evaluation
-from rigdda.envs.envelope import FIRST_SEED, barrier_free
+from rigdda.envs.envelope import barrier_free
 from rigdda.envs.outcome_cache import Sample
 from rigdda.envs.problem import DesignProblem, Targets
 from rigdda.envs.recorder import Recorder, Shown, Trigger
 from rigdda.envs.rendering import picture
 from rigdda.envs.replay_record import EpisodeRecord, Versions, as_json
 from rigdda.envs.site_sampling import EpisodeSites, Places, Slots
+from rigdda.seeds import EPISODES, OBSERVATIONS
 
 
 class Ask(NamedTuple):
@@ -74,7 +75,7 @@ def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> li
 
 def _observation_releases(ask: Ask) -> list[tuple[int, str]]:
     """Return the seed and event of each observation release."""
-    seeds = range(FIRST_SEED, FIRST_SEED + ask.observed_releases)
+    seeds = range(OBSERVATIONS, OBSERVATIONS + ask.observed_releases)
     return [(seed, name) for name in ask.problem.site.event_names for seed in seeds]
 
 
@@ -125,9 +126,6 @@ Action = NDArray[np.floating[Any]]
 Observation = dict[str, NDArray[np.float32]] | NDArray[np.float32]
 Info = dict[str, Any]
 Step = tuple[Observation, float, bool, bool, Info]
-
-SCORED_SEEDS = 2**31
-"""Upper limit of the seeds of scored releases; envelopes use others."""
 
 MOST_RELEASES = 100_000
 """Maximum number of releases of an episode; all of them are simulated in every step."""
@@ -289,7 +287,7 @@ class BarrierEnv(LayoutEnv):
         super().reset(seed=seed)
         self.open, self._seed = False, seed
         self.problem = self.sites.draw(self.np_random, options)
-        self.seeds = tuple(self.np_random.integers(SCORED_SEEDS, size=self.releases).tolist())
+        self.seeds = tuple(self.np_random.integers(EPISODES, size=self.releases).tolist())
 
     def start(self, observed: Sample) -> tuple[Observation, Info]:
         """Start the drawn episode and return its first observation and info."""

@@ -29,6 +29,9 @@ Rows = NDArray[np.int64]
 SHIPPED = Path(__file__).parent / "forecasts.safetensors"
 """The table that ships with the package, made by `python -m experiments.known_forecasts`."""
 
+PARTS = ("train", "validation", "test")
+"""Purposes of the sites of a table."""
+
 NAMES = tuple(sorted(FIELDS))
 """Arrays of the observation of a site in the order in which a table concatenates them."""
 
@@ -77,6 +80,8 @@ class ForecastTable:
     def rows(self, site: str | Sequence[str]) -> Rows:
         """Return the rows of a site, of a split or of a sequence of sites.
 
+        The rows of "train", "validation" and "test" are those of both versions of the splits.
+
         Raises
         ------
         BadInput
@@ -84,8 +89,8 @@ class ForecastTable:
         """
         place = {name: row for row, name in enumerate(self.names)}
         split = "train" if site == "random" else site
-        if isinstance(split, str) and split in sites.SPLITS:
-            found = [place[name] for name in sites.split(split) if name in place]
+        if isinstance(split, str) and split in PARTS:
+            found = [row for row, name in enumerate(self.names) if sites.part_of(name) == split]
             if not found:
                 raise BadInput("site", site, "the table of forecasts has no site of this split")
             return np.array(found)

@@ -27,6 +27,7 @@ from rigdda.envs.intervals import Estimate, Mean, total
 from rigdda.envs.outcome_cache import Sample, fingerprint
 from rigdda.envs.siting import FeasiblePlaces
 from rigdda.model.site_tables import BarrierZone
+from rigdda.seeds import first_event_generator
 
 MET, MISSED, UNDECIDED = "met", "missed", "undecided"
 """States of targets: the upper bounds of all probabilities and of the individual risk are low
@@ -286,7 +287,7 @@ def events_of_seeds(shares: Mapping[str, float], seeds: Sequence[int]) -> tuple[
     if len(seeds) >= 2 * len(names):
         return tuple(names[i] for i in _order(tuple(shares.values()), len(seeds)))
     edges = np.cumsum(list(shares.values()))[:-1]
-    first = np.random.default_rng([int(seeds[0]), len(names), 2**31]).random()
+    first = first_event_generator(int(seeds[0]), len(names)).random()
     place = (first + GOLDEN * np.arange(len(seeds))) % 1.0
     return tuple(names[i] for i in np.searchsorted(edges, place, side="right"))
 

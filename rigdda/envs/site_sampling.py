@@ -35,7 +35,7 @@ Places = Place | Sequence[Place]
 RANDOM_ALIAS = "random"
 """Alias of the split "train"."""
 
-SPLITS = ("train", "validation", "test")
+SPLITS = sites.SPLITS
 """Splits of the generated sites."""
 
 MOST_PROBLEMS = 512

@@ -31,7 +31,7 @@ Rows = tuple[int, int, int, int]
 """Two rows whose smaller friction and restitution apply, and two for rolling resistance."""
 
 
-class Meetings:
+class ContactProperties:
     """Contact properties of all pairs of surfaces of a site in a release.
 
     N is the number of surfaces of the site, in order.

@@ -15,7 +15,7 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
-from rigdda import check, display, fields
+from rigdda import check, display, fields, seeds
 from rigdda.barriers import (
     Barrier,
     Built,
@@ -39,7 +39,7 @@ from rigdda.model.block import Block
 from rigdda.model.outcome import Outcome
 from rigdda.model.scene import Scene
 from rigdda.model.settings import Settings, longest_step
-from rigdda.model.site_generator import generate
+from rigdda.model.site_generator import NARROW, WIDE, generate
 from rigdda.model.site_tables import Drawn, Event, SiteTables
 from rigdda.model.soundness import check_site
 from rigdda.model.source import Source
@@ -51,9 +51,6 @@ Value = TypeVar("Value")
 ENCODING_ROUNDING = 1e-9
 """Tolerance for the overlap of barriers and loose rock [m]; encoded layouts lose their last
 digits."""
-
-STRENGTHS, PITS, STEMS = 1, 2, 3
-"""Last numbers of the seeds for the random properties of the ground and of the forest."""
 
 FARTHEST = 2.5
 """Standard deviations at which random normal numbers of the ground are truncated."""
@@ -132,8 +129,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         """Return a built-in or generated site by its name, see `rigdda.sites.load`."""
         if name in site_names.names():
             return cls.parse(site_names.text(name), name)
-        family, number = site_names.instance(name)
-        return generate(cls.named(site_names.built_in(family, number)), name, number)
+        family, number, wide = site_names.instance(name)
+        return generate(cls.named(family), name, number, WIDE if wide else NARROW)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the site as TOML; the inverse of `load`.
@@ -184,7 +181,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             If the seed is invalid, or a rate is that of arrivals, see `Event.release_rate`.
         """
         rates = np.array([event.release_rate for event in self.events])
-        rng = np.random.default_rng([check.integer("seed", seed, 0), len(rates)])
+        rng = seeds.event_generator(check.integer("seed", seed, 0), len(rates))
         return self.events[rng.choice(len(rates), p=rates / rates.sum())].name
 
     @property
@@ -214,6 +211,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def draw(self, seed: int = 0, event: str | None = None) -> Drawn:
         """Return the random properties of a release of an event.
 
+        Their random streams are in `rigdda.seeds`.
+
         Parameters
         ----------
         seed : int
@@ -236,7 +235,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if rock.band is None:
             normal, blocks = _cut(msgspec.json.encode(rock), seed, index)
         else:
-            rng = np.random.default_rng((seed, index))
+            rng = seeds.generator(seed, index)
             normal = rng.standard_normal()
             areas, drawn = loose_blocks.draw(rng, rock, what, loose_blocks.line(self.slope.points))
             blocks = tuple(drawn)
@@ -604,7 +603,7 @@ def _cut(source: bytes, seed: int, event: int) -> tuple[float, tuple[Block, ...]
     `source` is JSON. Results are cached (about 10 kB each), because cutting takes as long as
     simulating a small release and searches repeat the same releases.
     """
-    rng, rock = np.random.default_rng([seed, event]), msgspec.json.decode(source, type=Source)
+    rng, rock = seeds.generator(seed, event), msgspec.json.decode(source, type=Source)
     normal = rng.standard_normal()
     outlines = rock.cut(rng)
     starts = rock.disturbed(rng, len(outlines))
@@ -623,7 +622,7 @@ def _ground(
     """
     strengths: tuple[tuple[float, float, float], ...] = ()
     if any(surface.varies for surface in site.surfaces.values()):
-        rng = np.random.default_rng((seed, index, STRENGTHS))
+        rng = seeds.generator(seed, index, "strengths")
         drawn = rng.standard_normal((len(site.surfaces), 3)).tolist()
         strengths = tuple((_cut_off(a), _cut_off(b), _cut_off(c)) for a, b, c in drawn)
     amplitude = {name: s.roughness for name, s in site.surfaces.items() if s.roughness > 0.0}
@@ -631,7 +630,7 @@ def _ground(
         return strengths, None
     event = site.events[index]
     spacing = event.block_size(site.source(event.source))
-    return strengths, Roughness(spacing, amplitude, (seed, index, PITS))
+    return strengths, Roughness(spacing, amplitude, seeds.entropy(seed, index, "pits"))
 
 
 def _stems(
@@ -643,7 +642,7 @@ def _stems(
     """
     if not site.forest:
         return ()
-    rng, found = np.random.default_rng((seed, index, STEMS)), []
+    rng, found = seeds.generator(seed, index, "stems"), []
     for block in blocks:
         area, centre, _ = polygon_properties(block.vertices)
         found.append(forest.stems(rng, site.forest, float(centre[0]), math.sqrt(area)))

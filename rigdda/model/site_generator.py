@@ -2,9 +2,10 @@
 
 The ground of the built-in site is stretched: heights and lengths by common factors and each segment
 by its own factors. All chainages move with the ground, so that bands, zone and surfaces keep their
-places on it. Block sizes, rates, friction, closure costs and prices vary as well. The ranges are
-assumptions: wide enough that the best layouts of two instances differ, and narrow enough that a
-family keeps its character.
+places on it. Block sizes, rates, friction, closure costs and prices vary as well, and so do forest,
+existing barriers and traffic where the built-in site has them. The ranges are assumptions. The
+narrow ones are those of the first version of the splits. The wide ones, of the second version, let
+the best layouts of two instances of a family differ more.
 """
 
 from __future__ import annotations
@@ -19,11 +20,15 @@ import numpy as np
 
 from rigdda import BadInput, check
 from rigdda.barriers import MeshOption
+from rigdda.ground.grounds import GROUNDS, Span
 from rigdda.ground.prices import Consequences, Prices
 from rigdda.ground.surface import Surface
-from rigdda.model.site_names import FAMILIES
+from rigdda.model.existing import Existing
+from rigdda.model.forest import Forest
+from rigdda.model.site_names import FAMILIES, WIDE_FAMILIES
 from rigdda.model.site_tables import BarrierZone, Event, Road, SiteTables, Slope, Stretch
 from rigdda.model.source import Point, Source
+from rigdda.model.traffic import Traffic
 
 S = TypeVar("S", bound=SiteTables)
 
@@ -52,15 +57,26 @@ class Variation:
         Factor on the lengths between the toe and the road [-].
     segment_length, segment_height : (float, float)
         Further factors on the length and the height of each segment [-].
-    size, rate, closure, price : float
-        Greatest deviations of the logarithms of the block areas, of the rate of each event, of the
-        cost of a day of closure and of the prices of each kind of barrier [-].
+    size, rate, price : float
+        Greatest deviations of the logarithms of the block areas, of the rate of each event and of
+        the prices of each kind of barrier [-].
+    closure : (float, float)
+        Deviation of the logarithm of the cost of a day of closure [-].
     friction : float
         Greatest change of the friction angles [deg].
     restitution : (float, float)
         Factors on restitution and on rolling resistance [-].
     access : (float, float)
         Price factor of access at 60 m above the road [-].
+    size_of_event : float
+        Greatest further deviation of the logarithm of the block areas of each event [-].
+    stems, condition, sag : (float, float)
+        Factors on the stems of a forest per area, on the strength of existing fences and on the
+        height of existing barriers [-].
+    traffic : (float, float)
+        Deviation of the logarithm of the number of vehicles [-].
+    plausible : bool
+        Whether properties of surfaces are limited to the ranges of their grounds in the library.
     """
 
     height: Range = (0.8, 1.25)
@@ -70,31 +86,47 @@ class Variation:
     segment_height: Range = (0.96, 1.04)
     size: float = 0.35
     rate: float = 0.5
-    closure: float = 0.4
+    closure: Range = (-0.4, 0.4)
     price: float = 0.25
     friction: float = 2.0
     restitution: Range = (0.75, 1.25)
     access: Range = (1.0, 2.5)
+    size_of_event: float = 0.0
+    stems: Range = (0.7, 1.3)
+    condition: Range = (0.7, 1.3)
+    sag: Range = (0.9, 1.1)
+    traffic: Range = (-0.4, 0.4)
+    plausible: bool = False
 
 
 NARROW = Variation()
-"""Ranges of the generated sites of the splits."""
+"""Ranges of the generated sites of the first version of the splits."""
 
 WIDE = Variation(
     height=(0.55, 1.7),
     incline=(0.85, 1.18),
-    room=(0.5, 2.2),
+    room=(0.5, 1.6),
     segment_length=(0.7, 1.4),
     segment_height=(0.85, 1.18),
     size=1.0,
-    rate=1.0,
-    closure=1.0,
+    rate=0.8,
+    closure=(-1.8, 0.5),
     price=0.6,
     friction=4.0,
     restitution=(0.5, 1.5),
     access=(1.0, 3.0),
+    size_of_event=0.5,
+    stems=(0.3, 1.8),
+    condition=(0.4, 2.2),
+    sag=(0.7, 1.4),
+    traffic=(-1.8, 0.5),
+    plausible=True,
 )
-"""Wide ranges, with which the best layouts of two instances of a family differ more."""
+"""Ranges of the second version of the splits, with which the best layouts of two instances of a
+family differ more."""
+
+SEEDS = tuple(dict.fromkeys((*FAMILIES, *WIDE_FAMILIES)))
+"""Families in the order that determines the random numbers of their instances."""
 
 ATTEMPTS = 20
 """Largest number of draws for an instance; wide ranges give some sites that are refused."""
@@ -173,7 +205,7 @@ def generate(base: S, name: str, number: int, by: Variation = NARROW) -> S:
     BadInput
         If no draw gives a valid site.
     """
-    seed = [FAMILIES.index(base.name), number]
+    seed = [SEEDS.index(base.name), number]
     for attempt in range(ATTEMPTS):
         rng = np.random.default_rng([*seed, attempt] if attempt else seed)
         try:
@@ -206,6 +238,9 @@ def _instance(base: S, name: str, number: int, by: Variation, rng: np.random.Gen
         prices=_prices(base.prices, by, rng),
         consequences=_consequences(base.consequences, by, rng),
         meshes=tuple(_mesh(option, ground, rng) for option in base.meshes),
+        forest=tuple(_forest(forest, ground, by, rng) for forest in base.forest),
+        existing=tuple(_existing(old, ground, by, rng) for old in base.existing),
+        traffic=_traffic(base.traffic, by, rng),
     )
 
 
@@ -236,6 +271,8 @@ def _event(event: Event, size: float, by: Variation, rng: np.random.Generator) -
     rate = round(event.rate * float(np.exp(rng.uniform(-by.rate, by.rate))), 4)
     if event.area is None:
         return replace(event, rate=rate)
+    if by.size_of_event:
+        size *= float(np.exp(rng.uniform(-by.size_of_event, by.size_of_event)))
     low, high = (round(area * size, 4) for area in event.area)
     return replace(event, rate=rate, area=(low, high))
 
@@ -251,7 +288,7 @@ def _zone(
 
 def _surfaces(base: SiteTables, by: Variation, rng: np.random.Generator) -> dict[str, Surface]:
     shift, factor, loss = rng.uniform(-by.friction, by.friction), *rng.uniform(*by.restitution, 2)
-    return {
+    found = {
         name: replace(
             surface,
             friction_deg=round(surface.friction_deg + shift, 2),
@@ -260,6 +297,24 @@ def _surfaces(base: SiteTables, by: Variation, rng: np.random.Generator) -> dict
         )
         for name, surface in base.surfaces.items()
     }
+    return {name: _plausible(one) for name, one in found.items()} if by.plausible else found
+
+
+def _plausible(surface: Surface) -> Surface:
+    """Return a surface with properties in the ranges of its ground."""
+    ground = GROUNDS.get(surface.ground or "")
+    if ground is None:
+        return surface
+    return replace(
+        surface,
+        friction_deg=_within(surface.friction_deg, ground.friction_deg),
+        restitution=_within(surface.restitution or 0.0, ground.restitution),
+        rolling=_within(surface.rolling, ground.rolling),
+    )
+
+
+def _within(value: float, span: Span) -> float:
+    return min(max(value, span.low), span.high)
 
 
 def _prices(prices: Prices, by: Variation, rng: np.random.Generator) -> Prices:
@@ -277,7 +332,7 @@ def _prices(prices: Prices, by: Variation, rng: np.random.Generator) -> Prices:
 
 def _consequences(what: Consequences, by: Variation, rng: np.random.Generator) -> Consequences:
     """Return consequences with another cost per day of closure, as for another traffic volume."""
-    factor = float(np.exp(rng.uniform(-by.closure, by.closure)))
+    factor = float(np.exp(rng.uniform(*by.closure)))
     return replace(what, closure=round(what.closure * factor, -2))
 
 
@@ -286,6 +341,32 @@ def _mesh(option: MeshOption, ground: StretchedGround, rng: np.random.Generator)
     high = float(ground.new[:, 1].max() / (ground.old[:, 1].max() or 1.0))
     price = check.number("mesh price", option.price * rng.uniform(0.85, 1.2), 0.0)
     return replace(option, area=round(option.area * high, 2), price=round(price, 1))
+
+
+def _forest(
+    forest: Forest, ground: StretchedGround, by: Variation, rng: np.random.Generator
+) -> Forest:
+    """Return a forest moved with the ground, with another number of stems."""
+    stems = round(forest.stems * rng.uniform(*by.stems), 0)
+    return replace(forest, start=ground.x(forest.start), end=ground.x(forest.end), stems=stems)
+
+
+def _existing(
+    old: Existing, ground: StretchedGround, by: Variation, rng: np.random.Generator
+) -> Existing:
+    """Return an existing barrier moved with the ground, of another height and strength."""
+    condition = min(max(round(old.condition * rng.uniform(*by.condition), 2), 0.05), 1.0)
+    height = None if old.height is None else round(old.height * rng.uniform(*by.sag), 2)
+    weak = condition if old.kind == "fence" else old.condition
+    return replace(old, x=ground.x(old.x), height=height, condition=weak)
+
+
+def _traffic(traffic: Traffic | None, by: Variation, rng: np.random.Generator) -> Traffic | None:
+    """Return the traffic with another number of vehicles."""
+    if traffic is None:
+        return None
+    factor = float(np.exp(rng.uniform(*by.traffic)))
+    return replace(traffic, vehicles_per_day=round(traffic.vehicles_per_day * factor, -1))
 
 
 def millimetres(value: float) -> float:

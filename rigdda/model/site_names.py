@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import resources
+from typing import NamedTuple
 
 from rigdda import check
 from rigdda.errors import BadInput
@@ -10,7 +11,19 @@ from rigdda.errors import BadInput
 FAMILIES = ("verge", "bench", "talus", "narrow", "cliff", "shu-hwa")
 """Families of design sites, each named after its built-in site."""
 
-SPLITS = {
+TRAINING_SPLIT = "train"
+"""Split that the value network and the agent of corridors are trained on."""
+
+WIDE_FAMILIES = (
+    "verge", "bench", "talus", "narrow", "cliff", "slab-cut", "forest", "terrace", "old-fence",
+)  # fmt: skip
+"""Families of the generated sites with wide ranges, each named after its built-in site. None has
+events of 100 blocks or more, so that all are simulated within minutes."""
+
+WIDE = "wide"
+"""First part of the names of generated sites with wide ranges, and of their splits."""
+
+NUMBERS = {
     "train": range(1200),
     "validation": range(10**6, 10**6 + 60),
     "test": range(10**9, 10**9 + 60),
@@ -18,6 +31,9 @@ SPLITS = {
 """Numbers of the generated sites for training, for validation (model selection) and for testing
 (final evaluation only). The training sites are too many to be memorised, but few enough that most
 releases without barriers are simulated only once."""
+
+SPLITS = (*NUMBERS, *(f"{WIDE}-{name}" for name in NUMBERS))
+"""Names of the splits: first version, and the second version with wide ranges and more families."""
 
 FOLDER = resources.files("rigdda") / "sites"
 """Folder with the files of the built-in sites."""
@@ -34,29 +50,51 @@ def text(name: str) -> str:
     return (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def instance(name: str) -> tuple[str, int]:
-    """Return the family and number of a generated site from its name, such as "bench-17".
+class Instance(NamedTuple):
+    """What the name of a generated site says.
+
+    Parameters
+    ----------
+    family : str
+        Its family, of which the built-in site has the name.
+    number : int
+        Its number.
+    wide : bool
+        Whether it has wide ranges.
+    """
+
+    family: str
+    number: int
+    wide: bool
+
+
+def instance(name: str) -> Instance:
+    """Return the family, number and range of a generated site from its name.
+
+    Names are such as "bench-17", or "random-17" of the family `FAMILIES` [17 % 6]. With wide
+    ranges, they are "wide-bench-17", or "wide-17" of the family `WIDE_FAMILIES` [17 % 9].
 
     Raises
     ------
     BadInput
         If it is not the name of a generated site.
     """
-    family, _, number = name.rpartition("-")
-    if family in (*FAMILIES, "random") and number.isdecimal() and number == str(int(number)):
-        return family, int(number)
-    known = ", ".join((*names(), "random-N", *(f"{family}-N" for family in FAMILIES)))
+    first, _, number = name.rpartition("-")
+    if number.isdecimal() and number == str(int(number)):
+        n, wide = int(number), first == WIDE or first.startswith(f"{WIDE}-")
+        families, cycle = (WIDE_FAMILIES, WIDE) if wide else (FAMILIES, "random")
+        own = families[n % len(families)] if first == cycle else first.removeprefix(f"{WIDE}-")
+        if own in families:
+            return Instance(own, n, wide)
+    known = ", ".join((*names(), "random-N", *(f"{family}-N" for family in FAMILIES), "wide-N"))
     raise BadInput("site", name, f"choose one of {known}")
 
 
-def built_in(family: str, number: int) -> str:
-    """Return the built-in site of an instance; "random" cycles through the families."""
-    return FAMILIES[number % len(FAMILIES)] if family == "random" else family
+def split(name: str, family: str | None = None) -> list[str]:
+    """Return the names of the generated sites of a split.
 
-
-def split(name: str, family: str = "random") -> list[str]:
-    """Return the names of the generated sites of a split: "train", "validation" or "test".
-
+    The splits "train", "validation" and "test" are of the first version. Those of the second
+    version, "wide-train", "wide-validation" and "wide-test", have wide ranges and more families.
     By default the sites cycle through all families; `family` selects one. No site is in two splits.
 
     Raises
@@ -64,6 +102,30 @@ def split(name: str, family: str = "random") -> list[str]:
     BadInput
         If there is no such split or family.
     """
-    numbers = SPLITS[check.one_of("split", name, SPLITS)]
-    check.one_of("family", family, (*FAMILIES, "random"))
-    return [f"{family}-{number}" for number in numbers]
+    check.one_of("split", name, SPLITS)
+    wide = name.startswith(f"{WIDE}-")
+    first = WIDE if wide else "random"
+    if family is not None:
+        check.one_of("family", family, WIDE_FAMILIES if wide else FAMILIES)
+        first = f"{WIDE}-{family}" if wide else family
+    return [f"{first}-{number}" for number in NUMBERS[name.removeprefix(f"{WIDE}-")]]
+
+
+def family_of(name: str) -> str:
+    """Return the family of a generated site from its name.
+
+    Raises
+    ------
+    BadInput
+        If it is not the name of a generated site.
+    """
+    return instance(name).family
+
+
+def part_of(name: str) -> str | None:
+    """Return "train", "validation" or "test" for a site of a split of any version, else None."""
+    try:
+        number = instance(name).number
+    except BadInput:
+        return None
+    return next((part for part, numbers in NUMBERS.items() if number in numbers), None)

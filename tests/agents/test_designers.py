@@ -15,12 +15,10 @@ from rigdda.agents import DESIGNERS
 from rigdda.agents.designers.convex import starts
 from rigdda.agents.designers.protocol import (
     MISSED_TARGET_PENALTY,
-    STREAMS,
     DesignResult,
     Ledger,
     Plan,
     final_score,
-    release_seeds,
     score,
     search,
     value,
@@ -29,6 +27,7 @@ from rigdda.agents.designers.protocol import (
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem
 from rigdda.envs.problem import Targets
+from rigdda.seeds import is_of_stream
 
 SEARCHES = ("cma", "pareto", "race", "random", "tpe")
 FIXED = ("constant", "rule")
@@ -129,23 +128,6 @@ def test_what_does_not_search_says_so(name: str, valley: Valley) -> None:
     assert len(result.history.entries) == 1
 
 
-def test_no_seed_occurs_twice_in_a_stream() -> None:
-    """The generator draws words of 32 bits, of which two are equal in many long streams."""
-    for stream in STREAMS:
-        seeds = release_seeds(stream, 0, 20_000)
-        assert len(set(seeds)) == len(seeds)
-        assert release_seeds(stream, 0, 500, 19_500) == seeds[19_500:]
-
-
-def test_streams_of_release_seeds_never_meet() -> None:
-    drawn = [
-        {s for seed in range(20) for s in release_seeds(stream, seed, 200)} for stream in STREAMS
-    ]
-    assert len(set.union(*drawn)) == sum(map(len, drawn)) == len(STREAMS) * 20 * 200
-    assert release_seeds("search", 3, 8) == release_seeds("search", 3, 32)[:8]
-    assert release_seeds("search", 3, 8, 5) == release_seeds("search", 3, 32)[5:13]
-
-
 @pytest.mark.parametrize("simulations", [1, 2, 16, 80, 240, 1000, 20_000])
 def test_a_plan_leaves_half_of_the_budget_to_the_search(simulations: int) -> None:
     plan = Plan.of(simulations)
@@ -158,7 +140,7 @@ class Lucky(Valley):
     """One layout looks better than it is, but only on the releases of the search."""
 
     def outcome(self, layout: Layout, seed: int, event: str) -> Outcome:
-        if layout and layout[0].x == 30.0 and seed % len(STREAMS) == STREAMS.index("search"):
+        if layout and layout[0].x == 30.0 and is_of_stream(seed, "search"):
             return super().outcome((BEST,) * 9, seed, event)
         return super().outcome(layout, seed, event)
 

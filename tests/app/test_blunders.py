@@ -8,7 +8,7 @@ import pytest
 
 from rigdda import BadInput, Site
 from rigdda.app.new_site import SiteRequest, compose
-from rigdda.app.site_check import oddities
+from rigdda.app.site_oddities import oddities
 
 SURVEY = """chainage,elevation
 3100,588.2

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from rigdda import BadInput, Site
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.app import fidelity_bias
 from rigdda.app.cli import main
 from rigdda.envs import DesignProblem, problem
+from rigdda.seeds import release_seeds
 
 
 def test_fast_has_fewer_larger_blocks_and_a_longer_step() -> None:

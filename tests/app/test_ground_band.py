@@ -57,8 +57,8 @@ def test_a_row_equals_an_evaluation_from_scratch(designed: tuple[Path, str]) -> 
     paths = [key for key in row if key.startswith("surfaces.")]
     site = set_numbers(Site.load("narrow"), paths, [float(row[path]) for path in paths])
     layout = load_layout(folder / "whole/layout.toml")
-    from rigdda.agents.designers.protocol import release_seeds
     from rigdda.envs import DesignProblem
+    from rigdda.seeds import release_seeds
 
     drawn = release_seeds("verification", 2, int(row["releases"]))
     events = DesignProblem("narrow").plan(drawn)

@@ -11,7 +11,7 @@ from processes import png_size
 
 import rigdda
 from rigdda import Site
-from rigdda.app import site_check
+from rigdda.app import site_check, site_picture
 from rigdda.app.reports import tables
 from rigdda.app.site_check import Trial
 from rigdda.app.terminal import progress, show
@@ -75,5 +75,5 @@ def test_tables_show_a_name_as_it_is(name: str, capsys: pytest.CaptureFixture[st
 
 @pytest.mark.parametrize("name", [*NAMES, "$\\frac{x$", "from $5 to $6", "a_b^c"])
 def test_the_picture_of_a_check_takes_any_name(name: str, tmp_path: Path):
-    site_check.draw(tmp_path / "site.png", called(name))
+    site_picture.draw(tmp_path / "site.png", called(name))
     assert min(png_size(tmp_path / "site.png")) > 100

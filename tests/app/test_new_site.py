@@ -14,8 +14,9 @@ from processes import png_size, refused, rig, run
 
 import rigdda
 from rigdda import Event, Site
-from rigdda.app import site_check
-from rigdda.app.site_check import Trial, oddities
+from rigdda.app import site_check, site_oddities
+from rigdda.app.site_check import Trial
+from rigdda.app.site_oddities import oddities
 from rigdda.ground.grounds import GROUNDS
 from rigdda.ground.surface import Interface
 from rigdda.model.existing import Existing
@@ -470,7 +471,7 @@ def test_values_outside_the_range_of_their_ground_look_odd(slope, values, part):
 
 @pytest.mark.parametrize("ground", GROUNDS)
 def test_both_ends_of_the_range_of_a_ground_are_plausible(slope, ground):
-    spans = {law: getattr(GROUNDS[ground], law) for law in site_check.LAWS}
+    spans = {law: getattr(GROUNDS[ground], law) for law in site_oddities.LAWS}
     for end in ("typical", "low", "high"):
         values = {law: getattr(span, end) for law, span in spans.items()}
         surfaces = {**slope.surfaces, "other": rigdda.Surface(ground=ground, **values)}
@@ -538,13 +539,13 @@ def test_odd_values_are_called_as_they_are_written(tmp_path, old, new, part):
     file = tmp_path / "slope.toml"
     file.write_text(text.replace(f"\n{old}\n", f"\n{new}\n"))
     site = Site.load(file)
-    found = oddities(site, (), site_check.written_events(str(file)))
+    found = oddities(site, (), site_oddities.written_events(str(file)))
     assert len([line for line in found if part in line]) == 1, found
 
 
 def test_events_of_built_in_sites_are_known_as_they_are_written():
-    assert site_check.written_events("quick")["block"]["area"] == [0.3, 2.0]
-    assert site_check.written_events("verge-301") == {}
+    assert site_oddities.written_events("quick")["block"]["area"] == [0.3, 2.0]
+    assert site_oddities.written_events("verge-301") == {}
 
 
 def test_measured_blocks_that_are_tiny_look_odd(slope):

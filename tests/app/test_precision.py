@@ -20,7 +20,7 @@ from rigdda.app import design
 from rigdda.app.design_study import VerifiedLayout
 from rigdda.app.interim_answer import BEST, InterimAnswer
 from rigdda.app.reports import design_report
-from rigdda.app.verification import Verification, clear, stages
+from rigdda.app.verification import Verification, is_clear, stages
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.comparison import Difference
 from rigdda.envs.problem import Targets
@@ -96,11 +96,13 @@ def test_a_difference_is_clear_or_does_not_matter() -> None:
     def found(value: float, half: float) -> Difference:
         return Difference(value, (value - half, value + half), 100, 10)
 
-    assert clear(found(10.0, 7.0), 0.0, 4) and clear(found(-10.0, 7.0), 0.0, 4)
-    assert clear(found(10.0, 9.0), 0.0, 1)
-    assert not clear(found(10.0, 9.0), 0.0, 4)  # four questions widen the interval by 1.27
-    assert clear(found(1.0, 3.0), 5.0, 4) and not clear(found(3.0, 3.0), 5.0, 4)
-    assert clear(found(-9.0, 10.0), 5.0, 4)  # it may be cheaper by much, but not dearer by much
+    assert is_clear(found(10.0, 7.0), 0.0, 4) and is_clear(found(-10.0, 7.0), 0.0, 4)
+    assert is_clear(found(10.0, 9.0), 0.0, 1)
+    assert not is_clear(found(10.0, 9.0), 0.0, 4)  # four questions widen the interval by 1.27
+    assert is_clear(found(1.0, 3.0), 5.0, 4) and not is_clear(found(3.0, 3.0), 5.0, 4)
+    assert is_clear(
+        found(-9.0, 10.0), 5.0, 4
+    )  # it may be cheaper by much, but does not cost much more
 
 
 @pytest.fixture

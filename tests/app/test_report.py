@@ -31,9 +31,9 @@ import rigdda
 from rigdda import MECHANICS, BadInput, Site
 from rigdda.agents.run_record import RunRecord, read
 from rigdda.app import browser, cli, report_server
-from rigdda.app.reports import html_report
+from rigdda.app.reports import html_report, site_description
 from rigdda.app.reports.html_blocks import inline
-from rigdda.app.reports.html_report import EXHIBITS
+from rigdda.app.reports.report_contents import EXHIBITS
 
 DESIGN = [
     "design", "chute.toml", "--budget", "60", "--verify", "40", "--target", "0.05",
@@ -267,10 +267,10 @@ def test_each_exhibit_belongs_to_a_section() -> None:
 def test_differences_of_sites_name_each_value() -> None:
     site = Site.load("quick")
     prices = msgspec.structs.replace(site.prices, interest=0.05)
-    assert html_report.site_differences(site, site) == []
-    assert html_report.site_differences(site, msgspec.structs.replace(site, prices=prices)) == [
-        "prices.interest = 0.05 instead of 0.03"
-    ]
+    assert site_description.site_differences(site, site) == []
+    assert site_description.site_differences(
+        site, msgspec.structs.replace(site, prices=prices)
+    ) == ["prices.interest = 0.05 instead of 0.03"]
 
 
 # Records of results folders

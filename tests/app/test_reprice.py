@@ -16,12 +16,12 @@ from processes import refused, rows, run
 import rigdda
 from rigdda import BadInput, Outcome, Site
 from rigdda.agents.designers.frontier import TriedLayout
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.app import archive, design, reprice
 from rigdda.app.reports import design_report
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation, ensemble
 from rigdda.envs.cost import judge
+from rigdda.seeds import NO_BARRIERS, release_seeds
 
 VERIFIED = 40
 
@@ -81,9 +81,7 @@ def anew(site: Site, layout: rigdda.Layout, drawn: list[tuple[int, str]]) -> lis
 def from_scratch(site: Site, problem: DesignProblem, kept: archive.Archive) -> list[Evaluation]:
     """Return the evaluations of the verified layouts, with every release simulated anew."""
     counts = DesignProblem(kept.site).nothing.reach
-    seeds = {
-        n: range(ensemble.FIRST_SEED, ensemble.FIRST_SEED + counts[n].releases) for n in counts
-    }
+    seeds = {n: range(NO_BARRIERS, NO_BARRIERS + counts[n].releases) for n in counts}
     bare = anew(site, (), [(seed, name) for name in site.event_names for seed in seeds[name]])
     facts = ensemble._facts(site, bare)
     nothing = judge(site, (), bare, {}, {})

@@ -15,8 +15,8 @@ from rigdda import BadInput, Site
 from rigdda.app import cli
 from rigdda.envs import DesignProblem, with_release_rates
 from rigdda.envs.arrivals import ENOUGH, LEAST_RELEASES, MOST_RELEASES, release_rates
-from rigdda.envs.ensemble import FIRST_SEED
 from rigdda.passages import passages
+from rigdda.seeds import NO_BARRIERS
 
 
 def arriving(site: Site, *names: str, **values: float) -> Site:
@@ -35,7 +35,7 @@ def site() -> Site:
 def test_the_rate_of_releases_is_that_of_arrivals_over_their_probability(site: Site) -> None:
     (rate,) = release_rates(site)
     n = rate.chance.releases
-    seeds = range(FIRST_SEED, FIRST_SEED + n)
+    seeds = range(NO_BARRIERS, NO_BARRIERS + n)
     reached = [rigdda.release(site, (), seed, "block")[1].reached for seed in seeds]
     p = sum(reached) / n
     assert 0.0 < p < 1.0 and LEAST_RELEASES <= n <= MOST_RELEASES

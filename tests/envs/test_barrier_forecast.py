@@ -275,3 +275,26 @@ def test_the_table_that_ships_is_of_this_version() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(gymnasium.make(NAME).unwrapped)
+
+
+@pytest.mark.slow
+def test_maskable_ppo_learns_and_builds_only_what_can_be_built(table: ForecastTable) -> None:
+    """MaskablePPO of sb3-contrib runs on the environment as it is."""
+    contrib = pytest.importorskip("sb3_contrib")
+    env = gymnasium.make(NAME, table=table, site=SITES[:3], flat=True)
+    env.reset(seed=0)
+    agent = contrib.MaskablePPO(
+        "MlpPolicy", env, n_steps=128, batch_size=64, learning_rate=3e-3, gamma=1.0, seed=0,
+        device="cpu", ent_coef=0.0,
+    )  # fmt: skip
+    agent.learn(2_048)
+    rewards = []
+    for name in SITES[:3]:
+        seen, info = env.reset(options={"site": name})
+        masks = env.unwrapped.action_masks()
+        assert (masks == info["action_mask"]).all()
+        action, _ = agent.predict(seen, action_masks=masks, deterministic=True)
+        assert masks[action]
+        rewards.append(env.step(action)[1])
+    usual = table.reward[:3].sum() / table.mask[:3].sum()  # of random layouts
+    assert np.mean(rewards) > 0.5 * (usual + table.reward[:3].max(axis=1).mean())

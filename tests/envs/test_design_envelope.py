@@ -15,6 +15,7 @@ from rigdda.envs import design_envelope
 from rigdda.envs.design_envelope import DesignEnvelope, governing_events, smoothed, stations
 from rigdda.geometry import polygon_properties
 from rigdda.passages import passages
+from rigdda.seeds import design_envelope_seed
 
 BLOCKS = 120
 
@@ -55,7 +56,7 @@ def test_stations_are_fixed_and_at_most_a_metre_apart(site: Site, found: DesignE
 def test_a_characteristic_value_is_never_below_the_quantile_of_its_station(
     site: Site, found: DesignEnvelope
 ) -> None:
-    first = design_envelope.FIRST_SEED + 3 * 2**20
+    first = design_envelope_seed(3)
     releases = [(first + i, "block") for i in range(BLOCKS)]
     raw = passages(site, (), releases, found.stations)
     for k, event in enumerate(found.events[0].speed):
@@ -67,7 +68,7 @@ def test_a_characteristic_value_is_never_below_the_quantile_of_its_station(
 
 
 def test_the_mass_is_that_of_whole_blocks(site: Site, found: DesignEnvelope) -> None:
-    first = design_envelope.FIRST_SEED + 3 * 2**20
+    first = design_envelope_seed(3)
     blocks = [site.draw(first + i, "block").blocks[0] for i in range(BLOCKS)]
     masses = [block.density * abs(polygon_properties(block.vertices)[0]) ** 1.5 for block in blocks]
     assert found.events[0].mass == pytest.approx(np.quantile(masses, 0.95))

@@ -13,15 +13,15 @@ import rigdda
 from rigdda import Site, sites
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import (
-    FIRST_SEED,
     ZONE_STATIONS,
     barrier_free,
     envelope,
     largest,
     stations,
 )
-from rigdda.envs.environments import SCORED_SEEDS, BarrierDesign, BarrierEnv, BarrierPlacement
+from rigdda.envs.environments import BarrierDesign, BarrierEnv, BarrierPlacement
 from rigdda.envs.observation import BOUND, FIELDS, LAYOUT_FIELDS, observe, space
+from rigdda.seeds import EPISODES, OBSERVATIONS
 
 CUT = cut()
 SEEN_AT_SITES = 30
@@ -69,7 +69,7 @@ def test_what_falls_without_barriers_is_told() -> None:
     for event in CUT.events:
         group = int(largest(CUT, event.name) > 1)
         count = max(2, 16 // largest(CUT, event.name))
-        for seed in range(FIRST_SEED, FIRST_SEED + count):
+        for seed in range(OBSERVATIONS, OBSERVATIONS + count):
             scene = CUT.realise((), seed, event.name)
             run = rigdda.Simulation(scene, CUT.settings(scene), lines.tolist()).run(8.0)
             for k in range(ZONE_STATIONS):
@@ -88,7 +88,7 @@ def test_what_falls_without_barriers_is_told() -> None:
 def test_envelopes_are_simulated_once_and_on_seeds_that_are_not_scored(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    assert FIRST_SEED >= SCORED_SEEDS
+    assert OBSERVATIONS >= EPISODES
     first = envelope(CUT)
     monkeypatch.setattr(Site, "realise", None)
     assert envelope(msgspec.structs.replace(CUT)) is first

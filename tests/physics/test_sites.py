@@ -33,7 +33,7 @@ RITCHIE = [name for name in NAMES if name.startswith("ritchie-")]
 
 def test_promised_sites_are_there():
     paper = {"ritchie-35", "ritchie-60", "ritchie-80", "shu-hwa-paper", "toppling"}
-    assert {"quick", *paper, *sites.design_names()} == set(NAMES)
+    assert {"quick", *paper, *sites.design_names(), *sites.WIDE_FAMILIES} == set(NAMES)
     assert len(sites.design_names()) == 6
     assert all(Site.load(name).family == "paper" for name in paper)
     assert all(Site.load(name).family == name for name in sites.design_names())

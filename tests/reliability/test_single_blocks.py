@@ -13,7 +13,7 @@ import rigdda
 from rigdda import BadInput, Block, Ditch, Embankment, Fence, Layout, Site, Wall, sites
 from rigdda.dynamics.packing import pack_interfaces
 from rigdda.ground.surface import Interface
-from rigdda.model.interfaces import Meetings
+from rigdda.model.interfaces import ContactProperties
 from rigdda.model.site_tables import Scatter
 from rigdda.releases import Batch, SingleReleases, can_share
 
@@ -71,19 +71,19 @@ def test_how_surfaces_meet(site, barriers):
     for seed in range(20):
         drawn = site.draw(seed, "block")
         scene = site.scene(drawn, barriers)
-        meetings = Meetings(site)
-        meetings.draw(drawn)
+        properties = ContactProperties(site)
+        properties.draw(drawn)
         wanted, names = pack_interfaces(scene, list(scene.surfaces)), len(scene.surfaces)
-        tangents = np.vectorize(lambda angle: np.tan(np.radians(angle)))(meetings.friction_deg)
+        tangents = np.vectorize(lambda angle: np.tan(np.radians(angle)))(properties.friction_deg)
         np.testing.assert_allclose(wanted["friction"][:names, :names], tangents, rtol=1e-15)
         for field in ("restitution", "rolling", "restitution_speed"):
-            np.testing.assert_array_equal(wanted[field][:names, :names], getattr(meetings, field))
+            np.testing.assert_array_equal(wanted[field][:names, :names], getattr(properties, field))
         for fences in (wanted[names:], wanted[:, names:]):
             for field in ("friction", "restitution", "rolling"):
                 assert (fences[field] == 0.0).all()
             assert (fences["restitution_speed"] == np.inf).all()
         least = min(surface.friction_deg for surface in scene.surfaces.values())
-        assert meetings.least_friction_deg == least
+        assert properties.least_friction_deg == least
 
 
 def test_what_takes_a_scene_is_left_to_one():

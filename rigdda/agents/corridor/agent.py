@@ -31,11 +31,9 @@ from rigdda.agents.designers.race import forecasts_of, single_barriers
 from rigdda.agents.network import Network
 from rigdda.envs import DesignProblem
 from rigdda.envs.corridor_environment import CorridorDesign
+from rigdda.model.site_names import TRAINING_SPLIT
 
 Floats = NDArray[np.float64]
-
-SPLIT = "train"
-"""Split with the sites for training."""
 
 MOST_POINTS = 64
 """Largest number of points of a `Prospect`."""
@@ -176,7 +174,7 @@ def train(count: int, seed: int, out: Path, tick: Callable[[int, str], None]) ->
     Diverged
         If a simulation diverges.
     """
-    names = sites.split(SPLIT)
+    names = sites.split(TRAINING_SPLIT)
     check.integer("sites", count, 2, len(names))
     check.integer("seed", seed, 0, limits.SEED)
     chosen = np.random.default_rng(seed).choice(len(names), count, replace=False)

@@ -26,7 +26,7 @@ from rigdda import MECHANICS, BadInput, Corridor, Layout, __version__, check, di
 from rigdda.agents.corridor import allocation, programme
 from rigdda.agents.corridor.programme import SIMPLE_METHODS, Choice, Increment, Options
 from rigdda.agents.designers import front
-from rigdda.agents.designers.protocol import Entry, release_seeds
+from rigdda.agents.designers.protocol import Entry
 from rigdda.agents.designers.store import Store
 from rigdda.agents.limits import SEED
 from rigdda.barriers import from_table, to_tables
@@ -34,6 +34,7 @@ from rigdda.envs import CorridorEvaluation, CorridorProblem, DesignProblem, Eval
 from rigdda.envs.intervals import Estimate, Mean, estimate, total
 from rigdda.envs.problem import excess
 from rigdda.files import atomic
+from rigdda.seeds import derive, release_seeds
 
 Floats = np.ndarray
 
@@ -252,7 +253,7 @@ class Planner:
 
     def _seed(self, s: int) -> int:
         """Return the seed of the releases of a section."""
-        return int(np.random.SeedSequence([self.seed, s]).generate_state(1)[0])
+        return derive(self.seed, s)
 
     def _name(self, s: int) -> str:
         return self.problem.corridor.sections[s].name

@@ -1,6 +1,7 @@
 """Estimates of the effect of every barrier of the menu from releases without barriers.
 
 The ensemble of these releases records all blocks that pass each station. Several designers use it.
+The list of designers is `rigdda.agents.designers.DESIGNERS`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from rigdda import (
     Site,
 )
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import Ledger, release_seeds
+from rigdda.agents.designers.protocol import Ledger
 from rigdda.barriers import Removal
 from rigdda.barriers.base import ELEMENT
 from rigdda.barriers.fence import PANEL
@@ -31,6 +32,7 @@ from rigdda.barriers.gravity_wall import SLID
 from rigdda.envs import DesignProblem
 from rigdda.envs.outcome_cache import Memory, release_key
 from rigdda.geometry import polygon_properties
+from rigdda.seeds import release_seeds
 
 Floats = NDArray[np.float64]
 

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from rigdda import Barrier, Fence, Layout, Mesh, Site
 from rigdda.agents.designers.catalogue import CrossingEnsemble, Effects
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.barriers import Removal
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
 from rigdda.envs.problem import excess
+from rigdda.seeds import release_seeds
 
 if TYPE_CHECKING:
     from rigdda.agents.network import Network

@@ -1,7 +1,8 @@
 """Interface and results of designers, the budget of releases, and the search that most of them use.
 
-Seeds of releases are taken from disjoint streams for the search, the choice, the report and the
-verification. Layouts are ranked by Z. Layouts that miss a target rank behind all others.
+Seeds of releases are taken from disjoint streams of `rigdda.seeds` for the search, the choice, the
+report and the verification. Layouts are ranked by Z. Layouts that miss a target rank behind all
+others.
 """
 
 from __future__ import annotations
@@ -28,55 +29,11 @@ from rigdda.agents.limits import JOB_RELEASES, SEED
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.intervals import Estimate, Mean
 from rigdda.envs.problem import excess
-
-STREAMS = ("search", "semifinal", "final", "report", "ensemble", "verification")
-"""Streams of release seeds. search: all layouts of a search; semifinal, final: the best layouts
-again, to choose one of them; report: the chosen layout, for an unbiased evaluation; ensemble:
-releases without barriers that a designer analyses; verification: releases that no search uses."""
+from rigdda.seeds import release_seeds
 
 CHOICE_STREAM = "report"
 """Stream of the releases by which one of several verified layouts is chosen if a target is missed.
 No search is guided by it."""
-
-
-def release_seeds(stream: str, seed: int, n: int, start: int = 0) -> tuple[int, ...]:
-    """Return `n` release seeds of a stream.
-
-    The remainder of a seed modulo the number of streams is the index of its stream. Therefore two
-    streams never share a seed, whatever the seeds of the searches are.
-
-    Parameters
-    ----------
-    stream : str
-        One of `STREAMS`.
-    seed : int
-        Seed of the search, at least 0.
-    n : int
-        Number of seeds.
-    start : int
-        Number of seeds at the beginning of the stream that are skipped.
-
-    Raises
-    ------
-    BadInput
-        If the stream is unknown, or if a number is not an integer or is outside its range.
-    """
-    tag = STREAMS.index(check.one_of("stream", stream, STREAMS))
-    entropy = [check.integer("seed", seed, 0), tag]
-    count = check.integer("releases", n, 0, JOB_RELEASES)
-    words = _distinct(np.random.SeedSequence(entropy), start + count)[start:]
-    return tuple(word * len(STREAMS) + tag for word in words)
-
-
-def _distinct(sequence: np.random.SeedSequence, n: int) -> list[int]:
-    """Return the first `n` different words of a sequence.
-
-    Among 20,000 words of 32 bits, two are often equal.
-    """
-    drawn = n
-    while len(words := dict.fromkeys(sequence.generate_state(drawn).tolist())) < n:
-        drawn += n - len(words)
-    return list(words)
 
 
 MISSED_TARGET_PENALTY = 1e6

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,6 +40,10 @@ SOFT = 0.05
 
 LAYOUTS = 48
 """Default number of layouts of a catalogue."""
+
+LEAST_COST = 30.0
+"""Z without barriers below which a site is left out [EUR per metre of road and year]. Hardly any
+barrier costs less, so that there is nothing to decide, and relative figures mean little."""
 
 SLOTS = 3
 """Largest number of barriers of the problems of a table."""
@@ -76,18 +80,21 @@ class SiteForecasts:
         Features of each layout.
     z : (A,) array
         Forecast Z over Z without barriers [-]; NaN for layouts that cannot be built.
+    nothing : float
+        Z without barriers [EUR per metre of road and year].
     """
 
     observation: NDArray[np.float32]
     features: Floats
     z: Floats
+    nothing: float
 
     def save(self, path: Path, catalogue: Sequence[str]) -> None:
         """Write the numbers to a file, with the catalogue that they belong to."""
         with atomic(path) as part, part.open("wb") as file:
             np.savez_compressed(
                 file, observation=self.observation, features=self.features, z=self.z,
-                catalogue=json.dumps(list(catalogue)), mechanics=MECHANICS,
+                nothing=self.nothing, catalogue=json.dumps(list(catalogue)), mechanics=MECHANICS,
             )  # fmt: skip
 
     @classmethod
@@ -102,7 +109,8 @@ class SiteForecasts:
         hint = "remove this file and repeat the command"
         try:
             with np.load(path) as file:
-                found = cls(file["observation"], file["features"], file["z"])
+                nothing = float(file["nothing"])
+                found = cls(file["observation"], file["features"], file["z"], nothing)
                 made = str(file["mechanics"]), json.loads(str(file["catalogue"]))
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
             raise BadInput("forecasts", str(path), f"this is damaged: {hint} ({error})") from None
@@ -160,8 +168,10 @@ def problem(name: str) -> DesignProblem:
 
 def collect(
     names: Sequence[str], catalogue: Sequence[str], folder: Path, tick: Tick
-) -> list[SiteForecasts]:
+) -> dict[str, SiteForecasts]:
     """Return the forecasts of many sites; those that are in files of the folder are read.
+
+    Sites where Z without barriers is below `LEAST_COST` are left out.
 
     Raises
     ------
@@ -170,30 +180,34 @@ def collect(
     Diverged
         If a simulation without barriers diverges.
     """
-    found = []
+    found = {}
     for i, name in enumerate(names):
         tick(i, name)
         path = folder / f"{name}.npz"
         if not path.is_file():
             posed = problem(name)
-            own = of_site(posed, catalogue)
-            row = SiteForecasts(joined(observe(posed)), own.features, own.z)
-            row.save(path, catalogue)
-        found.append(SiteForecasts.load(path, catalogue))
+            own, nothing = of_site(posed, catalogue), posed.nothing.objective
+            SiteForecasts(joined(observe(posed)), own.features, own.z, nothing).save(
+                path, catalogue
+            )
+        row = SiteForecasts.load(path, catalogue)
+        if row.nothing >= LEAST_COST:
+            found[name] = row
     return found
 
 
 def table(
-    names: Sequence[str], found: Sequence[SiteForecasts], catalogue: Sequence[str],
-    kept: Sequence[int], notes: dict[str, str],
+    found: Mapping[str, SiteForecasts], catalogue: Sequence[str], kept: Sequence[int],
+    notes: dict[str, str],
 ) -> ForecastTable:  # fmt: skip
     """Return the table of some sites and of the kept layouts of a catalogue."""
+    rows = found.values()
     return ForecastTable(
-        tuple(names),
+        tuple(found),
         tuple(catalogue[i] for i in kept),
-        np.array([own.observation for own in found], dtype=np.float32),
-        np.array([own.features[kept] for own in found], dtype=np.float32),
-        np.array([own.z[kept] for own in found], dtype=np.float32),
+        np.array([own.observation for own in rows], dtype=np.float32),
+        np.array([own.features[kept] for own in rows], dtype=np.float32),
+        np.array([own.z[kept] for own in rows], dtype=np.float32),
         notes | {"mechanics": MECHANICS},
     )
 

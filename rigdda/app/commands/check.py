@@ -31,20 +31,20 @@ def check(site: str, seed: int, out: Path | None) -> None:
     SITE is the name of a built-in site or a TOML file. A few releases are simulated to estimate the
     time that others take. Writes site.png.
     """
-    from rigdda.app import site_check
+    from rigdda.app import site_check, site_oddities, site_picture
     from rigdda.app.released import released
 
     where = released(site)
     folder = folder_for(out, f"check-{where.name}", "site.png")
     with recorded_run(folder, where):
-        site_check.draw(folder / "site.png", where)
+        site_picture.draw(folder / "site.png", where)
         trials = site_check.try_releases(where, seed)
     for line in site_check.facts(where):
         click.echo(line)
     show(site_check.table(where, trials))
     click.echo(site_check.time_of(where, trials))
     warn_of_placeholders(site)
-    odd = site_check.oddities(where, trials, site_check.written_events(site))
+    odd = site_oddities.oddities(where, trials, site_oddities.written_events(site))
     for line in odd:
         finding(f"odd: {line}")
     words = f"{len(odd)} things look odd" if len(odd) != 1 else "1 thing looks odd"

@@ -18,15 +18,22 @@ from rigdda.app.terminal import (
     recorded_run,
     seed_option,
 )
+from rigdda.model.site_names import SPLITS
 
 if TYPE_CHECKING:
     pass
 
 
 @click.command()
-@click.option("--split", type=click.Choice(("train", "validation", "test")), default="train",
+@click.option("--split", type=click.Choice(SPLITS), default="train",
               show_default=True, help="Split of the generated sites to use.")  # fmt: skip
-@count_option("--sites", 1, 12, "Number of sites. With six, each family is used once.")
+@count_option(
+    "--sites",
+    1,
+    12,
+    "Number of sites. With six, each family of the first version is used once, and with "
+    "nine, each of those with wide ranges.",
+)
 @count_option("--layouts", 1, 32, "Number of layouts of each site.")
 @count_option("--releases", 1, 100, "Number of releases of each layout, over all events.")
 @seed_option("Seed of the layouts and of the releases.", SEED)

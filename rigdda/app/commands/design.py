@@ -31,6 +31,8 @@ from rigdda.app.terminal import (
 if TYPE_CHECKING:
     from rigdda.agents.designers.store import Store
     from rigdda.app.design_study import DesignStudy
+    from rigdda.app.uncertainty.ground_band import Band
+    from rigdda.app.uncertainty.parameters import Posterior
     from rigdda.envs import DesignProblem
 
 
@@ -141,7 +143,6 @@ def design(
     from rigdda.agents.designers.store import PROBLEM_FILE, record_problem
     from rigdda.app import design as job
     from rigdda.app.reports import design_report as report
-    from rigdda.app.uncertainty import ground_band
     from rigdda.app.uncertainty.parameters import read_posterior
 
     problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone, checks)
@@ -150,7 +151,6 @@ def design(
         out, f"design-{problem.site.name}", *report.DESIGN_FILES, *report.BAND_FILES, PROBLEM_FILE
     )
     record_problem(folder, problem, *report.DESIGN_FILES)
-    band = None
     with recorded_run(folder, problem.site):
         total = job.search_budget(problem, designer, budget) + CASES * verify
         with interim(total) as (tick, show_interim):
@@ -162,21 +162,10 @@ def design(
             )  # fmt: skip
             tick(total, "pictures")
             report.write_design(done, folder, seed)
-        if grounds:
-            with progress(grounds) as tick:
-                band = ground_band.assess(done, grounds, fitted, seed, folder, tick)
-            report.write_band(folder, band)
-            ground_band.forget(folder)
+        band = _on_other_grounds(done, grounds, fitted, seed, folder) if grounds else None
     _tell(done, store, folder)
     if band is not None:
-        click.echo(
-            f"on {len(band.samples)} other grounds ({band.source}), {band.releases} releases of "
-            "each layout on each;\nP(reach): of the design event that reaches the road most often"
-        )
-        show(report.band_table(band))
-        for line in filter(None, (report.band_verdict(band), report.band_on_target(band))):
-            finding(line)
-        click.echo(f"{', '.join(report.BAND_FILES)} are in {folder}")
+        _tell_band(band, folder)
     warn_of_placeholders(site)
 
 
@@ -202,6 +191,34 @@ def _pose(
     if any(target is not None for target in targets):
         asked["targets"] = Targets(*targets)
     return DesignProblem(released(site), **asked)
+
+
+def _on_other_grounds(
+    done: DesignStudy, grounds: int, fitted: Posterior | None, seed: int, folder: Path
+) -> Band:
+    """Compare the layouts on other grounds and write the files of the comparison."""
+    from rigdda.app.reports import design_report as report
+    from rigdda.app.uncertainty import ground_band
+
+    with progress(grounds) as tick:
+        band = ground_band.assess(done, grounds, fitted, seed, folder, tick)
+    report.write_band(folder, band)
+    ground_band.forget(folder)
+    return band
+
+
+def _tell_band(band: Band, folder: Path) -> None:
+    """Print the comparison on other grounds."""
+    from rigdda.app.reports import design_report as report
+
+    click.echo(
+        f"on {len(band.samples)} other grounds ({band.source}), {band.releases} releases of "
+        "each layout on each;\nP(reach): of the design event that reaches the road most often"
+    )
+    show(report.band_table(band))
+    for line in filter(None, (report.band_verdict(band), report.band_on_target(band))):
+        finding(line)
+    click.echo(f"{', '.join(report.BAND_FILES)} are in {folder}")
 
 
 def _tell(done: DesignStudy, store: Store, folder: Path) -> None:

@@ -20,6 +20,7 @@ from rigdda.app.terminal import (
     seed_option,
     show,
 )
+from rigdda.model.site_names import SPLITS
 
 if TYPE_CHECKING:
     pass
@@ -35,10 +36,16 @@ if TYPE_CHECKING:
     type=click.Path(),
     help="Trained policy to compare as well: a file that `rigdda train` wrote.",
 )
-@click.option("--split", type=click.Choice(("train", "validation", "test")), default="test",
+@click.option("--split", type=click.Choice(SPLITS), default="test",
               show_default=True, help="Split of the generated sites to use.")  # fmt: skip
 @count_option("--budget", 2, 3_000, "Number of releases that each designer may simulate on a site.")
-@count_option("--sites", 1, 6, "Number of sites. With six, each family is used once.")
+@count_option(
+    "--sites",
+    1,
+    6,
+    "Number of sites. With six, each family of the first version is used once, and with "
+    "nine, each of those with wide ranges.",
+)
 @count_option("--verify", 10, 2_000, "Number of new releases for verifying each layout.")
 @seed_option("Seed of the searches and of their releases.", SEED)
 @out_option("evaluate")

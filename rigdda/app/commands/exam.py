@@ -76,14 +76,13 @@ def exam(
 
     asked = specification.load(spec)
     references = specification.references(asked, spec)
-    part = scorer.part(asked, sites, corridors, budgets, verify, seed)
-    scorer.check_references(part, references)
+    part = specification.part(asked, sites, corridors, budgets, verify, seed)
+    specification.check_references(part, references)
     for name in filter(None, (entry, corridor_entry)):
         scorer.source_hash_of(name)  # refuses a module that cannot be found
     folder = folder_for(out, f"exam-{entry.rpartition(':')[2]}", *ranking.FILES)
-    secrets = (specification.file_of_references(asked, spec),)
     with recorded_run(folder), progress(part.size) as tick:
-        job = scorer.Scorer(part, references, entry, corridor_entry, folder, secrets, tick)
+        job = scorer.Scorer(part, references, entry, corridor_entry, folder, tick)
         scores = job.run()
         found = ranking.write(folder, scores, part, entry)
     click.echo(

@@ -16,20 +16,17 @@ from rigdda.app.exam.messages import (
     AnyReply,
     BatchReply,
     CrossingsReply,
-    CrossingsRequest,
-    EvaluateRequest,
     RefusedReply,
-    Request,
-    SampleRequest,
+    ReleaseRequest,
     Tables,
     TaskOrder,
 )
 from rigdda.app.exam.task import Task
 from rigdda.barriers import from_table
-from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs import DesignProblem
 
-COUNT = "its counter says {told:,} releases, but the scorer counted {used:,}"
-"""Reason for a flag."""
+BEYOND = "asked for more releases than its budget, past the count of its task"
+"""Reason for a flag. A task refuses such requests itself, so the scorer receives none from it."""
 
 
 class ReleaseCounter:
@@ -62,58 +59,49 @@ class ReleaseCounter:
         if reason not in self.flags:
             self.flags.append(reason)
 
-    def compare(self, told: int) -> None:
-        """Flag the entry if its own count differs."""
-        if told != self.used:
-            self.flag(COUNT.format(told=told, used=self.used))
-
-    def ask(self, request: Request) -> AnyReply:
+    def answer(self, request: ReleaseRequest) -> AnyReply:
         """Return the reply to a request; a refusal says what is wrong."""
-        self.compare(request.used)
         try:
-            return self._answer(request)
+            return self.ask(request)
         except BadInput as bad:
             return RefusedReply(bad.field, str(bad.value), bad.hint)
         except (Error, msgspec.MsgspecError) as error:
             return RefusedReply("request", type(error).__name__, str(error))
 
-    def _answer(self, request: Request) -> AnyReply:
-        """Return the reply to a request, whose releases count if they were simulated."""
+    def ask(self, request: ReleaseRequest) -> BatchReply | CrossingsReply:
+        """Return the releases of a request, which are counted.
+
+        Raises
+        ------
+        BadInput
+            If more releases are requested than are left, the layout is not feasible, or there is
+            no such section or event.
+        """
+        count, left = request.releases, self.budget - self.used
+        if count > left:
+            self.refused += 1
+            self.flag(BEYOND)
+            hint = f"ask for at most the {left:,} that are left of {self.budget:,}"
+            raise BadInput("releases", count, hint)
         place = check.integer("section", request.section, 0, len(self.problems) - 1)
-        problem = self.problems[place]
-        reply: AnyReply
-        if isinstance(request, EvaluateRequest):
-            count = self._afford(len(request.seeds))
-            layout = problem.check(from_tables(request.layout))
-            found = self._store.evaluate(problem, layout, request.seeds)
-            reply = BatchReply(StoredEvaluation(_bare(found), {}))
-        elif isinstance(request, SampleRequest):
-            count = self._afford(sum(map(len, request.seeds.values())))
-            layout = problem.check(from_tables(request.layout))
-            batch = self._store.sample(problem, layout, request.seeds)
-            reply = BatchReply(StoredEvaluation(_bare(batch.evaluation), batch.releases))
-        else:
-            assert isinstance(request, CrossingsRequest)
-            count = self._afford(sum(map(len, request.seeds.values())))
-            ensemble = catalogue.ensemble(problem.site, request.seeds, np.array(request.stations))
-            table = np.ascontiguousarray(ensemble.crossings).tobytes()
-            reply = CrossingsReply(table, ensemble.event.tolist(), ensemble.width.tolist())
+        reply = self._simulate(self.problems[place], request)
         self.used += count
         return reply
 
-    def _afford(self, releases: int) -> int:
-        """Return a number of releases if so many are left."""
-        left = self.budget - self.used
-        if releases > left:
-            self.refused += 1
-            hint = f"ask for at most the {left:,} that are left of {self.budget:,}"
-            raise BadInput("releases", releases, hint)
-        return releases
-
-
-def _bare(evaluation: Evaluation) -> Evaluation:
-    """Return an evaluation without what the entry knows and without the outcomes."""
-    return replace(evaluation, layout=(), seeds=(), outcomes=())
+    def _simulate(
+        self, problem: DesignProblem, request: ReleaseRequest
+    ) -> BatchReply | CrossingsReply:
+        seeds = request.seeds
+        if request.stations is not None and isinstance(seeds, dict):
+            stations = np.array(request.stations)
+            return CrossingsReply.of(catalogue.ensemble(problem.site, seeds, stations))
+        layout = problem.check(from_tables(request.layout))
+        if isinstance(seeds, dict):
+            found = self._store.sample(problem, layout, seeds)
+        else:
+            found = StoredEvaluation(self._store.evaluate(problem, layout, seeds), {})
+        bare = replace(found.evaluation, layout=(), seeds=(), outcomes=())
+        return BatchReply(StoredEvaluation(bare, found.releases))
 
 
 def from_tables(tables: Tables) -> Layout:

@@ -14,14 +14,16 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from rigdda import BadInput
+from rigdda import BadInput, Simulation
 from rigdda.agents.designers import catalogue
-from rigdda.app.exam import guard
 from rigdda.app.exam.messages import (
-    AnyReply,
+    BatchReply,
+    CrossingsReply,
     FailRequest,
     FlagRequest,
-    Request,
+    Message,
+    RefusedReply,
+    ReleaseRequest,
     SubmitRequest,
     TaskOrder,
     decode_reply,
@@ -29,6 +31,7 @@ from rigdda.app.exam.messages import (
 )
 from rigdda.app.exam.task import CorridorTask, Task, make_task
 from rigdda.barriers import as_layout, to_tables
+from rigdda.dynamics.single_block import SingleBlock
 from rigdda.envs.outcome_cache import fingerprint
 from rigdda.envs.problem import is_vector
 
@@ -36,26 +39,63 @@ Entry = Callable[[Any], Any]
 """Function that receives a task and returns a layout, or one for each section of a corridor."""
 
 
+SIMULATED = "simulated releases itself ({name}) instead of asking Task.evaluate"
+"""Reason for a flag."""
+
+
 class PipeLine:
-    """Connection to the scorer through a pipe."""
+    """Connection to the scorer through a pipe.
+
+    Attributes
+    ----------
+    used : int
+        Number of releases of the present task.
+    """
 
     def __init__(self, pipe: Connection):
-        self._pipe, self._lock = pipe, Lock()
+        self._pipe, self._lock, self.used = pipe, Lock(), 0
 
-    def ask(self, request: Request) -> AnyReply:
-        """Send a request and return the reply."""
+    def ask(self, request: ReleaseRequest) -> BatchReply | CrossingsReply:
+        """Send a request for releases, count them and return the reply.
+
+        Raises
+        ------
+        BadInput
+            If the scorer refuses the request.
+        """
         with self._lock:
             self._pipe.send_bytes(encode(request))
-            return decode_reply(self._pipe.recv_bytes())
+            reply = decode_reply(self._pipe.recv_bytes())
+            if isinstance(reply, RefusedReply):
+                raise BadInput(reply.field, reply.value, reply.hint)
+            self.used += request.releases
+        return reply
 
-    def tell(self, message: msgspec.Struct) -> None:
+    def tell(self, message: Message) -> None:
         """Send a message that has no reply."""
         self._pipe.send_bytes(encode(message))
 
     def order(self) -> TaskOrder | None:
         """Return the next task, or None if there is none."""
-        message = self._pipe.recv_bytes()
+        message, self.used = self._pipe.recv_bytes(), 0
         return msgspec.msgpack.decode(message, type=TaskOrder) if message else None
+
+
+def refuse_simulations(line: PipeLine) -> None:
+    """Let the simulations of this package report and refuse their use in this process.
+
+    It is for accounting: an entry should not simulate releases that are not counted by mistake. It
+    does not stop an entry that means to.
+    """
+    for kind, method, name in (
+        (Simulation, "__init__", "Simulation"), (SingleBlock, "run", "rigdda.release")
+    ):  # fmt: skip
+
+        def refuse(*_: Any, name: str = name, **__: Any) -> None:
+            line.tell(FlagRequest(SIMULATED.format(name=name)))
+            raise BadInput("simulation", name, "simulate with Task.evaluate, which counts releases")
+
+        setattr(kind, method, refuse)
 
 
 def load(name: str) -> Entry:
@@ -79,7 +119,7 @@ def load(name: str) -> Entry:
     return found
 
 
-def run(pipe: Connection, entry: str, corridor_entry: str, secrets: tuple[str, ...]) -> None:
+def run(pipe: Connection, entry: str, corridor_entry: str) -> None:
     """Work on tasks until the scorer sends none; the target of the process.
 
     Parameters
@@ -89,13 +129,11 @@ def run(pipe: Connection, entry: str, corridor_entry: str, secrets: tuple[str, .
     entry, corridor_entry : str
         Names of the functions. If the second is empty, corridors are designed section by section
         with the same money for every metre of road.
-    secrets : tuple of str
-        Files and folders that the entry must not open.
     """
     line, at = PipeLine(pipe), ""
     sys.stdout = sys.stderr  # tables of the command are on standard output
     sys.path.insert(0, os.getcwd())
-    guard.install(lambda reason: line.tell(FlagRequest(reason)), secrets)
+    refuse_simulations(line)
     try:
         function = load(entry)
         other = load(corridor_entry) if corridor_entry else equal_shares(function)
@@ -122,19 +160,14 @@ def _submission(
 ) -> SubmitRequest:
     """Let the entry work on a task and return what it submits."""
     task = make_task(order, line)
-    if isinstance(task, CorridorTask):
-        sections: Sequence[Task] = task.sections
-        _ask_scorer(sections)
-        found = corridor_entry(task)
-    else:
-        sections = (task,)
-        _ask_scorer(sections)
-        found = (entry(task),)
+    sections = task.sections if isinstance(task, CorridorTask) else (task,)
+    _ask_scorer(sections)
+    found = corridor_entry(task) if isinstance(task, CorridorTask) else (entry(task),)
     try:
         layouts = [_tables(own, layout) for own, layout in zip(sections, found, strict=True)]
     except (BadInput, TypeError, ValueError) as error:
-        return SubmitRequest(task.used, [], str(error))
-    return SubmitRequest(task.used, layouts)
+        return SubmitRequest([], str(error))
+    return SubmitRequest(layouts)
 
 
 def _tables(task: Task, layout: Any) -> list[dict[str, Any]]:

@@ -6,6 +6,7 @@ which submits a random layout.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import ModuleType
 
 from rigdda import Layout
@@ -40,46 +41,24 @@ def random_layout(task: Task) -> Layout:
     return task.problem.decode(task.rng.uniform(*task.problem.bounds))
 
 
-def random_search(task: Task) -> Layout:
-    """Build the best of random layouts."""
-    return _search(task, "random") if task.left >= LEAST_RELEASES else random_layout(task)
+def searching(name: str) -> Callable[[Task], Layout]:
+    """Return the entry that submits what a designer of the package finds."""
+
+    def entry(task: Task) -> Layout:
+        if task.left < LEAST_RELEASES:
+            return random_layout(task) if name == "random" else constant(task)
+        designer: ModuleType = designers.module(name)
+        result = designer.design(task.problem, task.left, task.seed, None, task.store())
+        layout: Layout = result.layout
+        return layout
+
+    return entry
 
 
-def race(task: Task) -> Layout:
-    """Build what the default designer finds."""
-    return _search(task, "race")
-
-
-def cma(task: Task) -> Layout:
-    """Build what CMA-ES finds."""
-    return _search(task, "cma")
-
-
-def tpe(task: Task) -> Layout:
-    """Build what the tree-structured Parzen estimator finds."""
-    return _search(task, "tpe")
-
-
-def convex(task: Task) -> Layout:
-    """Build what mixed-integer programming on estimated effects finds."""
-    return _search(task, "convex")
-
-
-def value(task: Task) -> Layout:
-    """Build the layout with the least forecast Z, from releases without barriers."""
-    return _search(task, "value")
-
-
-def policy(task: Task) -> Layout:
-    """Build what the policy of the package chooses, from releases without barriers."""
-    return _search(task, "policy")
-
-
-def _search(task: Task, name: str) -> Layout:
-    """Return the layout of a designer."""
-    if task.left < LEAST_RELEASES:
-        return constant(task)
-    designer: ModuleType = designers.module(name)
-    result = designer.design(task.problem, task.left, task.seed, None, task.store())
-    layout: Layout = result.layout
-    return layout
+random_search = searching("random")
+race = searching("race")
+cma = searching("cma")
+tpe = searching("tpe")
+convex = searching("convex")
+value = searching("value")
+policy = searching("policy")

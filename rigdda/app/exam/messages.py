@@ -8,81 +8,100 @@ from __future__ import annotations
 from typing import Any
 
 import msgspec
+import numpy as np
 
+from rigdda.agents.designers.catalogue import CROSSING, CrossingEnsemble
 from rigdda.agents.designers.store import StoredEvaluation
 
 Tables = list[dict[str, Any]]
 """A layout as the tables of a layout file."""
 
+Seeds = list[int] | dict[str, list[int]]
+"""Release seeds that are distributed over the events, or those of each event."""
 
-class Request(msgspec.Struct, frozen=True, tag=True):
-    """A request of an entry; `used` is the number of releases that it counted itself."""
+
+class Message(msgspec.Struct, frozen=True, tag=True):
+    """A message of either side."""
+
+
+class ReleaseRequest(Message, frozen=True):
+    """Simulate releases of a section with a layout.
+
+    Parameters
+    ----------
+    section : int
+        Index of the section.
+    layout : list of dict
+        The layout, as the tables of a layout file.
+    seeds : list of int, or dict of str to list of int
+        Release seeds. A list gives the evaluation only; a dict also gives the releases of each
+        event.
+    stations : list of float, optional
+        If given, the layout is ignored, and the reply contains the blocks that cross these stations
+        [m] in releases without barriers.
+    """
 
     section: int
-    used: int
-
-
-class EvaluateRequest(Request, frozen=True):
-    """Evaluate a layout on release seeds that are distributed over the events."""
-
     layout: Tables
-    seeds: list[int]
+    seeds: Seeds
+    stations: list[float] | None = None
+
+    @property
+    def releases(self) -> int:
+        """Number of releases."""
+        own = self.seeds
+        return sum(map(len, own.values())) if isinstance(own, dict) else len(own)
 
 
-class SampleRequest(Request, frozen=True):
-    """Simulate release seeds of chosen events with a layout."""
-
-    layout: Tables
-    seeds: dict[str, list[int]]
-
-
-class CrossingsRequest(Request, frozen=True):
-    """Simulate releases without barriers and record the blocks that cross stations [m]."""
-
-    seeds: dict[str, list[int]]
-    stations: list[float]
-
-
-class SubmitRequest(msgspec.Struct, frozen=True, tag=True):
+class SubmitRequest(Message, frozen=True):
     """Submit one layout for each section; `wrong` says why there are none."""
 
-    used: int
     layouts: list[Tables]
     wrong: str = ""
 
 
-class FlagRequest(msgspec.Struct, frozen=True, tag=True):
+class FlagRequest(Message, frozen=True):
     """Report that the entry broke a rule."""
 
     reason: str
 
 
-class FailRequest(msgspec.Struct, frozen=True, tag=True):
+class FailRequest(Message, frozen=True):
     """Report that the entry raised an error."""
 
     error: str
 
 
-AnyRequest = (
-    EvaluateRequest | SampleRequest | CrossingsRequest | SubmitRequest | FlagRequest | FailRequest
-)
+AnyRequest = ReleaseRequest | SubmitRequest | FlagRequest | FailRequest
 
 
-class BatchReply(msgspec.Struct, frozen=True, tag=True):
-    """Evaluated releases, without the layout, the seeds and the outcomes."""
+class BatchReply(Message, frozen=True):
+    """Evaluated releases, without their outcomes."""
 
     batch: StoredEvaluation
 
 
-class CrossingsReply(msgspec.Struct, frozen=True, tag=True):
-    """Crossings of stations: the bytes of the arrays of a `CrossingEnsemble`."""
+class CrossingsReply(Message, frozen=True):
+    """Crossings of stations: the arrays of a `CrossingEnsemble`."""
 
     crossings: bytes
     event: list[int]
     width: list[float]
 
+    @classmethod
+    def of(cls, found: CrossingEnsemble) -> CrossingsReply:
+        """Return the message with an ensemble."""
+        table = np.ascontiguousarray(found.crossings).tobytes()
+        return cls(table, found.event.tolist(), found.width.tolist())
 
-class RefusedReply(msgspec.Struct, frozen=True, tag=True):
+    def ensemble(self, stations: list[float]) -> CrossingEnsemble:
+        """Return the ensemble of a message."""
+        table = np.frombuffer(self.crossings, dtype=CROSSING)
+        event = np.array(self.event, dtype=np.int64)
+        return CrossingEnsemble(np.array(stations), table, event, np.array(self.width))
+
+
+class RefusedReply(Message, frozen=True):
     """A refused request: the field, its value and what to do, as in `rigdda.BadInput`."""
 
     field: str
@@ -93,7 +112,7 @@ class RefusedReply(msgspec.Struct, frozen=True, tag=True):
 AnyReply = BatchReply | CrossingsReply | RefusedReply
 
 
-class TaskOrder(msgspec.Struct, frozen=True, tag=True):
+class TaskOrder(Message, frozen=True):
     """A site or a corridor that an entry is to work on.
 
     Parameters
@@ -123,19 +142,11 @@ class TaskOrder(msgspec.Struct, frozen=True, tag=True):
     seed: int
 
 
-def encode(message: msgspec.Struct) -> bytes:
-    """Return a message as bytes."""
-    return msgspec.msgpack.encode(message)
+encode = msgspec.msgpack.encode
 
 
 def decode_request(message: bytes) -> AnyRequest:
-    """Return a request from its bytes.
-
-    Raises
-    ------
-    msgspec.MsgspecError
-        If the bytes are no request.
-    """
+    """Return a request from its bytes; `msgspec.MsgspecError` if they are none."""
     return msgspec.msgpack.decode(message, type=AnyRequest)
 
 

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
-from rigdda.app.exam.scorer import ExamPart, ExamScore
-from rigdda.app.exam.specification import References
+from rigdda.app.exam.scorer import ExamScore
+from rigdda.app.exam.specification import ExamPart, References
 from rigdda.app.reports import pictures, tables
 from rigdda.envs.intervals import student_interval
 from rigdda.rounding import between

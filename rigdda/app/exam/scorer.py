@@ -24,23 +24,22 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from rigdda import MECHANICS, BadInput, Layout, __version__, check
+from rigdda import MECHANICS, BadInput, Layout, __version__
 from rigdda.agents.designers import rule
 from rigdda.agents.designers.store import Store
-from rigdda.agents.limits import SEED
 from rigdda.app.exam import entrant
 from rigdda.app.exam.counter import ReleaseCounter, from_tables, problems_of
 from rigdda.app.exam.messages import (
     FailRequest,
     FlagRequest,
-    Request,
+    ReleaseRequest,
     SubmitRequest,
     Tables,
     TaskOrder,
     decode_request,
     encode,
 )
-from rigdda.app.exam.specification import References, Specification
+from rigdda.app.exam.specification import ExamPart, References
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.observation import observe
 from rigdda.files import atomic
@@ -52,105 +51,6 @@ SUBMISSIONS, IDENTITY, EVALUATIONS = "submissions.json", "exam.json", "evaluatio
 
 TOLERANCE = 1e-6
 """Relative tolerance of the construction cost of a corridor."""
-
-
-class ExamPart(msgspec.Struct, frozen=True):
-    """The part of an exam that is played.
-
-    Parameters
-    ----------
-    specification : Specification
-        The exam.
-    sites, corridors : int
-        Number of sites and of corridors, the first ones.
-    budgets : tuple of int
-        Releases per section.
-    verification : int
-        Releases of each layout.
-    seed : int
-        Seed of the tasks.
-    """
-
-    specification: Specification
-    sites: int
-    corridors: int
-    budgets: tuple[int, ...]
-    verification: int
-    seed: int
-
-    @property
-    def complete(self) -> bool:
-        """Whether the results may enter the leaderboard: nothing but budgets is left out."""
-        whole = self.specification
-        return (
-            whole.current
-            and self.sites == len(whole.sites)
-            and self.corridors == len(whole.corridors)
-            and set(self.budgets) <= set(whole.budgets)
-            and self.verification >= whole.verification
-        )
-
-    def orders(self, budget: int) -> list[TaskOrder]:
-        """Return the tasks with a budget."""
-        whole, most = self.specification, self.specification.max_barriers
-        found = [
-            TaskOrder(site, [site], [1.0], None, most, budget, self.seed)
-            for site in whole.sites[: self.sites]
-        ]
-        for corridor in whole.corridors[: self.corridors]:
-            money = corridor.money * sum(corridor.lengths)
-            lists = list(corridor.sites), list(corridor.lengths)
-            found.append(TaskOrder(corridor.name, *lists, money, most, budget, self.seed))
-        return found
-
-    @property
-    def size(self) -> int:
-        """Number of tasks."""
-        return len(self.budgets) * (self.sites + self.corridors)
-
-
-def part(
-    specification: Specification,
-    sites: int | None = None,
-    corridors: int | None = None,
-    budgets: Sequence[int] = (),
-    verification: int | None = None,
-    seed: int = 0,
-) -> ExamPart:
-    """Return a part of an exam, by default all of it.
-
-    If only `sites` is given, no corridor is played.
-
-    Raises
-    ------
-    BadInput
-        If a number is outside its range.
-    """
-    most = len(specification.sites), len(specification.corridors)
-    count = most[0] if sites is None else check.integer("sites", sites, 1, most[0])
-    usual = most[1] if sites is None else 0
-    roads = usual if corridors is None else check.integer("corridors", corridors, 0, most[1])
-    asked = sorted({check.integer("budget", b, 0) for b in budgets or specification.budgets})
-    drawn = specification.verification if verification is None else verification
-    return ExamPart(
-        specification, count, roads, tuple(asked), check.integer("verify", drawn, 10),
-        check.integer("seed", seed, 0, SEED),
-    )  # fmt: skip
-
-
-def check_references(asked: ExamPart, references: References) -> None:
-    """Check that there is a reference for each task.
-
-    Raises
-    ------
-    BadInput
-        If one is missing, or random layouts are as good as it.
-    """
-    for order in asked.orders(asked.budgets[0]):
-        anchor = references.anchors.get(order.name)
-        if anchor is None or not anchor.reference < min(anchor.random, anchor.nothing):
-            hint = "record one that is better: python -m experiments.exam_reference"
-            raise BadInput("references", order.name, hint)
 
 
 class Submission(msgspec.Struct, frozen=True):
@@ -246,8 +146,6 @@ class Scorer:
         Names of the functions, "package.module:function". The second may be empty.
     folder : path
         Folder of the run, from which it continues.
-    secrets : sequence of path
-        Files that the entry must not open, besides those of the run.
     tick : callable
         Called with the number of completed tasks and a description.
     """
@@ -259,13 +157,10 @@ class Scorer:
         entry: str,
         corridor_entry: str,
         folder: Path,
-        secrets: Sequence[Path],
         tick: Tick = lambda done, words: None,
     ):
         self.asked, self.references, self.folder, self.tick = asked, references, folder, tick
         self.entry, self.corridor_entry = entry, corridor_entry
-        own = (folder / name for name in (SUBMISSIONS, IDENTITY, EVALUATIONS))
-        self._secrets = tuple(str(path) for path in (*secrets, *own))
         self._store = Store(folder / EVALUATIONS)
         self._done: dict[tuple[str, int], Submission] = {}
 
@@ -329,7 +224,7 @@ class Scorer:
                 prepare(problem)
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         played = []
-        with _process(self.entry, self.corridor_entry, self._secrets) as pipe:
+        with _process(self.entry, self.corridor_entry) as pipe:
             for order in orders:
                 self.tick(len(self._done), f"{order.name}: {budget:,} releases")
                 played.append(self._task(pipe, order))
@@ -348,8 +243,8 @@ class Scorer:
             pipe.send_bytes(encode(order))
             while True:
                 request = decode_request(pipe.recv_bytes())
-                if isinstance(request, Request):
-                    pipe.send_bytes(encode(counter.ask(request)))
+                if isinstance(request, ReleaseRequest):
+                    pipe.send_bytes(encode(counter.answer(request)))
                 elif isinstance(request, FlagRequest):
                     counter.flag(request.reason)
                 elif isinstance(request, FailRequest):
@@ -427,7 +322,6 @@ def _submission(
     request: SubmitRequest,
 ) -> Submission:
     """Return a checked submission; one that cannot be built is flagged and has no layouts."""
-    counter.compare(request.used)
     layouts: list[Tables] = []
     try:
         if request.wrong:
@@ -464,11 +358,11 @@ def _decoded(file: Path, of: type[Any]) -> Any:
 
 
 @contextmanager
-def _process(entry: str, corridor_entry: str, secrets: tuple[str, ...]) -> Iterator[Connection]:
+def _process(entry: str, corridor_entry: str) -> Iterator[Connection]:
     """Start a process of an entry and yield the connection to it."""
     spawn = multiprocessing.get_context("spawn")
     pipe, other = spawn.Pipe()
-    child = spawn.Process(target=entrant.run, args=(other, entry, corridor_entry, secrets))
+    child = spawn.Process(target=entrant.run, args=(other, entry, corridor_entry))
     child.start()
     other.close()
     try:

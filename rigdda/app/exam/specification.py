@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
 
-from rigdda import MECHANICS, BadInput, Corridor, Layout, Site, fields
+from rigdda import MECHANICS, BadInput, Corridor, Layout, Site, check, fields
+from rigdda.agents.limits import SEED
+from rigdda.app.exam.messages import TaskOrder
 from rigdda.barriers import from_table, to_tables
 from rigdda.envs import DesignProblem
 from rigdda.fields import about
@@ -163,3 +166,102 @@ def references(
         raise BadInput("references", str(file), f"{hint} ({error.strerror})") from None
     except msgspec.MsgspecError as error:
         raise BadInput("references", str(file), f"{hint} ({error})") from None
+
+
+class ExamPart(msgspec.Struct, frozen=True):
+    """The part of an exam that is played.
+
+    Parameters
+    ----------
+    specification : Specification
+        The exam.
+    sites, corridors : int
+        Number of sites and of corridors, the first ones.
+    budgets : tuple of int
+        Releases per section.
+    verification : int
+        Releases of each layout.
+    seed : int
+        Seed of the tasks.
+    """
+
+    specification: Specification
+    sites: int
+    corridors: int
+    budgets: tuple[int, ...]
+    verification: int
+    seed: int
+
+    @property
+    def complete(self) -> bool:
+        """Whether the results may enter the leaderboard: nothing but budgets is left out."""
+        whole = self.specification
+        return (
+            whole.current
+            and self.sites == len(whole.sites)
+            and self.corridors == len(whole.corridors)
+            and set(self.budgets) <= set(whole.budgets)
+            and self.verification >= whole.verification
+        )
+
+    def orders(self, budget: int) -> list[TaskOrder]:
+        """Return the tasks with a budget."""
+        whole, most = self.specification, self.specification.max_barriers
+        found = [
+            TaskOrder(site, [site], [1.0], None, most, budget, self.seed)
+            for site in whole.sites[: self.sites]
+        ]
+        for corridor in whole.corridors[: self.corridors]:
+            money = corridor.money * sum(corridor.lengths)
+            lists = list(corridor.sites), list(corridor.lengths)
+            found.append(TaskOrder(corridor.name, *lists, money, most, budget, self.seed))
+        return found
+
+    @property
+    def size(self) -> int:
+        """Number of tasks."""
+        return len(self.budgets) * (self.sites + self.corridors)
+
+
+def part(
+    specification: Specification,
+    sites: int | None = None,
+    corridors: int | None = None,
+    budgets: Sequence[int] = (),
+    verification: int | None = None,
+    seed: int = 0,
+) -> ExamPart:
+    """Return a part of an exam, by default all of it.
+
+    If only `sites` is given, no corridor is played.
+
+    Raises
+    ------
+    BadInput
+        If a number is outside its range.
+    """
+    most = len(specification.sites), len(specification.corridors)
+    count = most[0] if sites is None else check.integer("sites", sites, 1, most[0])
+    usual = most[1] if sites is None else 0
+    roads = usual if corridors is None else check.integer("corridors", corridors, 0, most[1])
+    asked = sorted({check.integer("budget", b, 0) for b in budgets or specification.budgets})
+    drawn = specification.verification if verification is None else verification
+    return ExamPart(
+        specification, count, roads, tuple(asked), check.integer("verify", drawn, 10),
+        check.integer("seed", seed, 0, SEED),
+    )  # fmt: skip
+
+
+def check_references(asked: ExamPart, references: References) -> None:
+    """Check that there is a reference for each task.
+
+    Raises
+    ------
+    BadInput
+        If one is missing, or random layouts are as good as it.
+    """
+    for order in asked.orders(asked.budgets[0]):
+        anchor = references.anchors.get(order.name)
+        if anchor is None or not anchor.reference < min(anchor.random, anchor.nothing):
+            hint = "record one that is better: python -m experiments.exam_reference"
+            raise BadInput("references", order.name, hint)

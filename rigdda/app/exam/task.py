@@ -15,52 +15,30 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda import BadInput, Barrier, Layout, Site, check
 from rigdda.agents.designers import catalogue
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.store import Ask, Store, StoredEvaluation
 from rigdda.app.exam.messages import (
-    AnyReply,
     BatchReply,
     CrossingsReply,
-    CrossingsRequest,
-    EvaluateRequest,
-    RefusedReply,
-    Request,
-    SampleRequest,
+    ReleaseRequest,
+    Seeds,
+    Tables,
     TaskOrder,
 )
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.observation import Arrays, observe
 from rigdda.envs.problem import is_vector
+from rigdda.seeds import release_seeds
 
 
 class Line(Protocol):
-    """Connection to the scorer."""
+    """Connection to the scorer; `used` is the number of releases simulated so far."""
 
-    def ask(self, request: Request) -> AnyReply:
-        """Return the reply to a request."""
+    used: int
+
+    def ask(self, request: ReleaseRequest) -> BatchReply | CrossingsReply:
+        """Return the reply to a request; `BadInput` if it is refused."""
         ...
-
-
-class ReleaseCount:
-    """Number of releases of all sections of a task, as the process of the entry counts them."""
-
-    def __init__(self) -> None:
-        self.used = 0
-
-
-def _reply(line: Line, request: Request) -> BatchReply | CrossingsReply:
-    """Return the reply to a request.
-
-    Raises
-    ------
-    BadInput
-        If the scorer refuses the request.
-    """
-    found = line.ask(request)
-    if isinstance(found, RefusedReply):
-        raise BadInput(found.field, found.value, found.hint)
-    return found
 
 
 class Task:
@@ -80,8 +58,6 @@ class Task:
         Connection to the scorer.
     section : int
         Index of the section of a corridor; 0 for a single site.
-    count : ReleaseCount, optional
-        Count that is shared with other sections.
 
     Attributes
     ----------
@@ -97,13 +73,11 @@ class Task:
         seed: int,
         line: Line,
         section: int = 0,
-        count: ReleaseCount | None = None,
     ):
         self.problem, self.name, self.budget, self.seed = problem, name, budget, seed
         self.rng = np.random.default_rng([seed, section, budget])
         self._line, self._section = line, section
-        self._count = count or ReleaseCount()
-        self._begun = self._count.used
+        self._begun = line.used
 
     @property
     def site(self) -> Site:
@@ -128,7 +102,7 @@ class Task:
     @property
     def used(self) -> int:
         """Number of releases used so far."""
-        return self._count.used - self._begun
+        return self._line.used - self._begun
 
     @property
     def left(self) -> int:
@@ -182,10 +156,9 @@ class Task:
         BadInput
             As `evaluate` does.
         """
-        self._afford(len(seeds))
-        asked = EvaluateRequest(self._section, self._count.used, to_tables(layout), list(seeds))
-        batch = self._batch(asked, len(seeds))
-        return replace(batch.evaluation, layout=layout, seeds=tuple(seeds))
+        found = self._ask(to_tables(layout), list(seeds))
+        assert isinstance(found, BatchReply)
+        return replace(found.batch.evaluation, layout=layout, seeds=tuple(seeds))
 
     def sample(self, layout: Layout, seeds: Mapping[str, Sequence[int]]) -> StoredEvaluation:
         """Return releases of chosen events with a layout, which are counted.
@@ -195,12 +168,9 @@ class Task:
         BadInput
             As `evaluate` does, and if there is no such event.
         """
-        drawn = {name: list(own) for name, own in seeds.items()}
-        count = sum(map(len, drawn.values()))
-        self._afford(count)
-        asked = SampleRequest(self._section, self._count.used, to_tables(layout), drawn)
-        batch = self._batch(asked, count)
-        return replace(batch, evaluation=replace(batch.evaluation, layout=layout))
+        found = self._ask(to_tables(layout), {name: list(own) for name, own in seeds.items()})
+        assert isinstance(found, BatchReply)
+        return replace(found.batch, evaluation=replace(found.batch.evaluation, layout=layout))
 
     def crossings(
         self, seeds: Mapping[str, Sequence[int]], stations: NDArray[np.float64]
@@ -212,29 +182,20 @@ class Task:
         BadInput
             If more releases are requested than are left, or there is no such event.
         """
-        drawn = {name: list(own) for name, own in seeds.items()}
-        count = sum(map(len, drawn.values()))
-        self._afford(count)
-        places = np.asarray(stations, dtype=np.float64)
-        asked = CrossingsRequest(self._section, self._count.used, drawn, places.tolist())
-        found = _reply(self._line, asked)
+        drawn, places = {name: list(own) for name, own in seeds.items()}, stations.tolist()
+        found = self._ask([], drawn, places)
         assert isinstance(found, CrossingsReply)
-        self._count.used += count
-        table = np.frombuffer(found.crossings, dtype=catalogue.CROSSING)
-        return catalogue.CrossingEnsemble(
-            places, table, np.array(found.event, dtype=np.int64), np.array(found.width)
-        )
+        return found.ensemble(places)
 
-    def _afford(self, releases: int) -> None:
-        if releases > self.left:
+    def _ask(
+        self, layout: Tables, seeds: Seeds, stations: list[float] | None = None
+    ) -> BatchReply | CrossingsReply:
+        """Return the reply to a request for releases, if so many are left."""
+        request = ReleaseRequest(self._section, layout, seeds, stations)
+        if request.releases > self.left:
             hint = f"ask for at most the {self.left:,} that are left of {self.budget:,}"
-            raise BadInput("releases", releases, hint)
-
-    def _batch(self, request: EvaluateRequest | SampleRequest, count: int) -> StoredEvaluation:
-        found = _reply(self._line, request)
-        assert isinstance(found, BatchReply)
-        self._count.used += count
-        return found.batch
+            raise BadInput("releases", request.releases, hint)
+        return self._line.ask(request)
 
     def store(self) -> Store:
         """Return a store for `rigdda.agents` designers, whose evaluations the scorer computes."""
@@ -244,8 +205,8 @@ class Task:
         """Return the same task with a largest capital cost [EUR/m] and a budget of its own."""
         old = self.problem
         problem = DesignProblem(old.site, old.max_barriers, old.kinds, max_cost=max_cost)
-        own = self._line, self._section, self._count
-        return Task(problem, self.name, min(releases, self.left), self.seed, *own)
+        most = min(releases, self.left)
+        return Task(problem, self.name, most, self.seed, self._line, self._section)
 
 
 class ScorerStore(Store):
@@ -301,19 +262,17 @@ class CorridorTask:
         self.money = float(order.money or 0.0)
         self.budget = order.budget * len(order.sites)
         self.rng = np.random.default_rng([order.seed, order.budget])
-        self._count = ReleaseCount()
+        self._line = line
+        problems = [DesignProblem(site, order.max_barriers) for site in order.sites]
         self.sections = tuple(
-            Task(
-                DesignProblem(site, order.max_barriers),
-                site, self.budget, order.seed, line, s, self._count,
-            )
-            for s, site in enumerate(order.sites)
-        )  # fmt: skip
+            Task(problem, site, self.budget, order.seed, line, s)
+            for s, (problem, site) in enumerate(zip(problems, order.sites, strict=True))
+        )
 
     @property
     def used(self) -> int:
         """Number of releases used so far in all sections."""
-        return self._count.used
+        return self._line.used
 
     @property
     def left(self) -> int:

@@ -58,10 +58,12 @@ class Findings:
             self._thread.join()
 
     def _work(self, site: Site, file: Path) -> None:
-        from rigdda.app import site_check  # imported by the thread: the page opens sooner
+        # imported by the thread: the page opens sooner
+        from rigdda.app import site_check, site_oddities
 
         try:
-            odd = site_check.oddities(site, (), site_check.written_events(str(file)))
+            written = site_oddities.written_events(str(file))
+            odd = site_oddities.oddities(site, (), written)
             found = Found(tuple(odd), site_check.placeholders(str(file)))
         except (Error, OSError) as error:
             found = Found((), 0, str(error))

@@ -19,7 +19,6 @@ from rigdda import Layout, Site
 from rigdda.agents.designers import rule
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.agents.designers.rule import RuleAnswer
 from rigdda.app import archive
 from rigdda.app.barrier_checks import BarrierCheck, LayoutChecks
@@ -51,6 +50,7 @@ from rigdda.envs.intervals import Estimate
 from rigdda.envs.problem import MET, MISSED, UNDECIDED
 from rigdda.envs.replay_record import release_record
 from rigdda.replay.recording import Marks
+from rigdda.seeds import release_seeds
 
 
 def interim_line(cases: Sequence[VerifiedLayout]) -> str:
@@ -446,21 +446,21 @@ def band_on_target(band: Band) -> str:
 def band_verdict(band: Band) -> str:
     """Return a text that says whether the choice survives other grounds."""
     count = len(band.samples)
-    best, open_, dearer = (
+    best, undecided, costlier = (
         round(count * band.share(state)) for state in ("cheapest", "undecided", "dearer")
     )
     words = f"on {best} of {count} grounds, the chosen layout is the cheapest of these"
-    if open_:
-        words += f"; on {open_}, another one is cheaper by no more than the noise"
-    if not dearer:
+    if undecided:
+        words += f"; on {undecided}, another one is cheaper by no more than the noise"
+    if not costlier:
         return f"{words}: the choice survives"
     lost = [sample for sample in band.samples if sample.state == "dearer"]
     rivals = dict.fromkeys(sample.cheapest.name for sample in lost)
     named = " or ".join(repr(name) for name in rivals)
     most = max(s.cases[-1].priced.objective - s.cheapest.priced.objective for s in lost)
     return (
-        f"{words}; on {dearer}, {named} is cheaper by up to {euros(most)} EUR per metre and year: "
-        "the choice depends on the ground"
+        f"{words}; on {costlier}, {named} is cheaper by up to {euros(most)} EUR per metre and "
+        "year: the choice depends on the ground"
     )
 
 

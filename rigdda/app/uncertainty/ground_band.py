@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Layout, Site
-from rigdda.agents.designers.protocol import release_seeds
 from rigdda.app.design_study import DesignStudy, design_events
 from rigdda.app.simulate import PARTS
 from rigdda.app.uncertainty.parameters import (
@@ -33,6 +32,7 @@ from rigdda.app.uncertainty.parameters import (
 from rigdda.app.uncertainty.varied_sites import Priced, SimulatedSite, noise, price, simulate
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.cost import judge
+from rigdda.seeds import release_seeds
 
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]
@@ -99,7 +99,7 @@ class GroundSample:
 
     @property
     def state(self) -> State:
-        """Whether the chosen layout is the cheapest, dearer than another one, or undecided.
+        """Whether the chosen layout is the cheapest, costs more than another, or is undecided.
 
         It is undecided if another layout is cheaper, but not by more than the noise of the
         difference on the same releases.
@@ -108,8 +108,8 @@ class GroundSample:
         if chosen.objective <= best.objective:
             return "cheapest"
         error = math.sqrt(float(noise((chosen.terms - best.terms)[None], self.strata)[0]))
-        dearer = chosen.objective - best.objective > CLEAR_ERRORS * error
-        return "dearer" if dearer else "undecided"
+        costs_more = chosen.objective - best.objective > CLEAR_ERRORS * error
+        return "dearer" if costs_more else "undecided"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,10 +21,13 @@ plain    b = -2 g with w_0 taken as 0: a penalty spring on the gap, the paper's 
 =======  ====================================================================================
 
 The shear spring acts in the same way on the shear velocity, starting from the shear force of the
-last step, and is limited by Coulomb friction in a return mapping. So does a spring on R times the
-relative rate of rotation, limited by rolling resistance: its force times R is the moment. Islands
-in motion, and at first also islands at rest, are relaxed instead, with rigid contacts
-(`rigdda.dynamics.relaxation`). Restitution acts only there (`rebound.rebound`).
+last step. Its force is limited by Coulomb friction in a return mapping. A rolling spring acts on R
+times the relative rate of rotation. Its force is limited by rolling resistance, and its moment is R
+times the force. Islands in motion, and at first also islands at rest, are relaxed instead, with
+rigid contacts (`rigdda.dynamics.relaxation`). Restitution acts only there (`rebound.rebound`).
+
+Coulomb friction is applied in `open_close.next_friction` to islands that are solved as a whole, and
+in `sweeps.drag_row` within the substeps of relaxation.
 """
 
 from __future__ import annotations

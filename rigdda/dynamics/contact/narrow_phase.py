@@ -28,7 +28,7 @@ from rigdda.dynamics.records import Bodies, Contact, Contacts, Parameters
 from rigdda.kernel import inlined, kernel
 
 
-class Meeting(NamedTuple):
+class EdgePair(NamedTuple):
     """The edges at which two bodies meet."""
 
     a: int  # bodies; the normal of a contact points to a
@@ -72,13 +72,13 @@ def copy_geometry(c: Contact, was: Contact) -> None:
 
 @inlined
 def clip_contacts(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, meeting: Meeting, window: Window
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, pair: EdgePair, window: Window
 ) -> int:
     """Add up to two contacts of two bodies where the incident edge lies over the face.
 
     Returns the new number of contacts.
     """
-    i, edge, j, other = meeting.i, meeting.edge, meeting.j, meeting.other
+    i, edge, j, other = pair.i, pair.edge, pair.j, pair.other
     face = outlines.corner[i, edge]
     nx, ny, x0, y0 = face.normal_x, face.normal_y, face.x, face.y
     tx, ty = -ny, nx
@@ -114,9 +114,9 @@ def clip_contacts(
             own_corner = s2 > stop
             corner, other_corner = end, other
         if own_corner:  # a corner of i meets the incident edge
-            k = add_corner(bodies, outlines, contacts, k, meeting, i, corner, gap)
+            k = add_corner(bodies, outlines, contacts, k, pair, i, corner, gap)
         else:
-            k = add_corner(bodies, outlines, contacts, k, meeting, j, other_corner, gap)
+            k = add_corner(bodies, outlines, contacts, k, pair, j, other_corner, gap)
     return k
 
 
@@ -138,7 +138,7 @@ def edges_in_line(outlines: Outlines, i: int, edge: int, way: int) -> int:
 
 @inlined
 def clip_lines(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, meeting: Meeting, window: Window
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, pair: EdgePair, window: Window
 ) -> int:
     """Add the contacts of all edges collinear with the face and with the incident edge.
 
@@ -146,7 +146,7 @@ def clip_lines(
     so that two bodies are in contact along their whole common length. Returns the new number of
     contacts, or -1 if they do not fit.
     """
-    a, b, i, edge, j, other = meeting
+    a, b, i, edge, j, other = pair
     first, n, m = k, outlines.polygon[i].count, outlines.polygon[j].count
     face_low, face_high = edges_in_line(outlines, i, edge, -1), edges_in_line(outlines, i, edge, 1)
     low, high = edges_in_line(outlines, j, other, -1), edges_in_line(outlines, j, other, 1)
@@ -155,7 +155,7 @@ def clip_lines(
         for against in range(other - low, other + high + 1):
             if k + 2 > len(contacts):
                 return -1
-            edges = Meeting(a, b, i, (at + n) % n, j, (against + m) % m)
+            edges = EdgePair(a, b, i, (at + n) % n, j, (against + m) % m)
             found = clip_contacts(bodies, outlines, contacts, k, edges, window)
             if alone:
                 return found
@@ -166,7 +166,7 @@ def clip_lines(
 
 @inlined
 def add_corner(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, meeting: Meeting, owner: int,
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, pair: EdgePair, owner: int,
     corner: int, gap: float,
 ) -> int:  # fmt: skip
     """Add the contact of a corner of polygon `owner` with the contact face.
@@ -176,7 +176,7 @@ def add_corner(
     """
     if outlines.corner[owner, corner].flush:
         return k
-    a, b, i, edge = meeting.a, meeting.b, meeting.i, meeting.edge
+    a, b, i, edge = pair.a, pair.b, pair.i, pair.edge
     sign = 1.0 if outlines.polygon[i].body == b else -1.0  # the normal points to a
     body = outlines.polygon[owner].body
     own, face = outlines.corner[owner, corner], outlines.corner[i, edge]
@@ -305,9 +305,9 @@ def collide_parts(
         if outlines.corner[face, edge].inner or outlines.corner[other, facing].inner:
             return k
         shift = -min(time_j, 1.0) if of_j else min(time_i, 1.0)
-        meeting = Meeting(a, b, face, edge, other, facing)
+        pair = EdgePair(a, b, face, edge, other, facing)
         window = Window(dx * shift, dy * shift, reach, margin, beside)
-        found = clip_lines(bodies, outlines, contacts, k, meeting, window)
+        found = clip_lines(bodies, outlines, contacts, k, pair, window)
         if found != k or (shift == 0.0 and not touching):
             return found
         if touching:
@@ -315,20 +315,18 @@ def collide_parts(
         else:
             time_i = time_j = 0.0
     face, edge, other = (j, edge_j, i) if of_j else (i, edge_i, j)
-    return add_deepest(bodies, outlines, contacts, k, Meeting(a, b, face, edge, other, 0))
+    return add_deepest(bodies, outlines, contacts, k, EdgePair(a, b, face, edge, other, 0))
 
 
 @kernel
 def add_deepest(
-    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, meeting: Meeting
+    bodies: Bodies, outlines: Outlines, contacts: Contacts, k: int, pair: EdgePair
 ) -> int:
     """Add the contact of the nearest corner of the other polygon with the line of the face.
 
     This serves bodies that touch although the face does not extend over the corner: with nearly
     parallel successive edges, rounding decides which of them is the face.
     """
-    face, n = outlines.corner[meeting.i, meeting.edge], outlines.polygon[meeting.j].count
-    gap, corner = axis_gap(
-        face.normal_x, face.normal_y, face.x, face.y, outlines.corner, meeting.j, n
-    )
-    return add_corner(bodies, outlines, contacts, k, meeting, meeting.j, corner, gap)
+    face, n = outlines.corner[pair.i, pair.edge], outlines.polygon[pair.j].count
+    gap, corner = axis_gap(face.normal_x, face.normal_y, face.x, face.y, outlines.corner, pair.j, n)
+    return add_corner(bodies, outlines, contacts, k, pair, pair.j, corner, gap)

@@ -259,8 +259,9 @@ def test_observations_are_added_and_the_match_follows_a_slider(serve, tab, proje
     tab.get_by_role("button", name="Add the observations").click()
     tab.get_by_text("of 150 releases of each event").wait_for()
     assert (project / "observed" / "runs.csv").read_text() == runs.read_text()
-    number = tab.locator("input:visible").nth(2)
     rolling = Site.load(project / "site.toml").surfaces["rock"].rolling
+    inputs = tab.locator("input.bk-input:visible:not([type=file])").all()
+    number = next(one for one in inputs if one.input_value() == str(rolling))
     number.fill("0.11")
     number.press("Enter")
     _wait(lambda: Site.load(project / "site.toml").surfaces["rock"].rolling != rolling)

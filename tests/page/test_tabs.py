@@ -12,7 +12,7 @@ pn = pytest.importorskip("panel", reason="the extra page is not installed")
 from panel.io.state import set_curdoc  # noqa: E402
 
 from rigdda import sites  # noqa: E402
-from rigdda.app import site_check  # noqa: E402
+from rigdda.app import site_oddities  # noqa: E402
 from rigdda.app.page import ground, locking  # noqa: E402
 from rigdda.app.page.falls_tab import BATCH, FallsTab  # noqa: E402
 from rigdda.app.page.state import Project  # noqa: E402
@@ -95,7 +95,7 @@ def test_what_is_odd_on_a_site_is_told_when_it_is_found(host):
         assert time.monotonic() < latest
         time.sleep(0.01)
     tab.tick()
-    odd = site_check.oddities(host.project.site, ())
+    odd = site_oddities.oddities(host.project.site, ())
     assert odd
     assert all(html.escape(line) in tab._findings.object for line in odd)
 

@@ -32,12 +32,23 @@ def locked(do: Callable[[], object]) -> None:
 
 
 def holding(do: Callable[[], object]) -> None:
-    """Do something in a callback of Bokeh, which holds the lock of the document."""
-    _held.append(pn.state.curdoc)
+    """Do something in a callback of Bokeh, which holds the lock of the document.
+
+    All changes of models are sent at the end, in their order. Otherwise Panel would send its own at
+    once or, if the connection is busy, later, and the browser might be told of a change of a model
+    before it knows the model.
+    """
+    document = pn.state.curdoc
+    outermost = document is not None and document not in _held
+    if outermost:
+        document.hold("collect")
+    _held.append(document)
     try:
         do()
     finally:
         _held.pop()
+        if outermost:
+            document.unhold()
 
 
 def watch(widget: Any, do: Callable[[], object], parameter: str = "value") -> None:

@@ -8,17 +8,19 @@ import time
 import weakref
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import tomli_w
 
-from rigdda.app.page.falls import Release
 from rigdda.app.page.jobs import Job
 from rigdda.app.page.live import Live
 from rigdda.app.page.replays import Viewing
 from rigdda.app.page.state import LAYOUT, Project
 from rigdda.app.page.theme import Theme
 from rigdda.files import atomic
+
+if TYPE_CHECKING:
+    from rigdda.app.page.falls import Release
 
 AHEAD = 1.0
 """Longest time for which releases that are drawn go before the figures of the layout [s]."""

@@ -84,10 +84,12 @@ def _policy(
     """Train a policy and compare it with simple rules."""
     from rigdda.agents import training
     from rigdda.app.reports import tables, training_table
+    from rigdda.envs import forecast_table
 
     terms = training.Terms(sites, algorithm, simulate, seed)
+    number = sites or len(forecast_table.load().rows("train"))
     folder = folder_for(out, "train", *training.FILES, COMPARISON)
-    with recorded_run(folder), progress(max(sites, compare, training.MEMBERS)) as tick:
+    with recorded_run(folder), progress(max(number, compare, training.MEMBERS)) as tick:
         policy = training.train(terms, folder, tick)
         rows = training.compare(policy, folder, terms, compare, verify, tick)
         if rows:

@@ -12,7 +12,8 @@ from rigdda import Fence, save_layout
 from rigdda.app.cli import main
 from rigdda.app.page.falls import ENDS, Release, shares
 from rigdda.app.page.figures import study_table
-from rigdda.app.page.live import CURRENT, Live
+from rigdda.app.page.known_layout import CURRENT
+from rigdda.app.page.live import Live
 
 LAYOUT = (Fence(30.0, 4.0, energy_class=1000),)
 

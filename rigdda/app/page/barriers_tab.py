@@ -15,7 +15,7 @@ from rigdda import Layout
 from rigdda.app.page import placing
 from rigdda.app.page.falls import Fall, Release
 from rigdda.app.page.forms import Bound, button, heading, in_words, number, paragraph, table
-from rigdda.app.page.live import LiveFigures
+from rigdda.app.page.known_layout import LiveFigures
 from rigdda.app.page.placing import Grip
 from rigdda.app.page.section import HandleSource, Section
 from rigdda.app.page.theme import SERIES, TALL

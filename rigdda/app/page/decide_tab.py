@@ -17,7 +17,7 @@ from rigdda.app.page import placing
 from rigdda.app.page.barriers_tab import NAMES, alternatives_html, shown
 from rigdda.app.page.forms import Bound, button, heading, in_words, paragraph, text
 from rigdda.app.page.jobs import CANCELLED, FAILED, INTERRUPTED, RUNNING, Tried, tried
-from rigdda.app.page.live import MOST_BARRIERS
+from rigdda.app.page.known_layout import MOST_BARRIERS
 from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.section import plain_axes
 from rigdda.app.page.theme import SERIES, TALL, WRAPPED

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigdda import Layout, Site
 from rigdda.app.barrier_checks import LayoutChecks, check_layout
-from rigdda.app.page.live import CURRENT, MOST_BARRIERS, NOTHING, LiveFigures, Outcomes
+from rigdda.app.page.known_layout import CURRENT, MOST_BARRIERS, NOTHING, LiveFigures, Outcomes
 from rigdda.app.page.placing import kinds_for
 from rigdda.app.reports import study_report
 from rigdda.app.reports.study_report import StudiedLayout, StudyResults

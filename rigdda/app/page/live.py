@@ -13,18 +13,12 @@ import time
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
 import rigdda
-from rigdda import BadInput, Error, Layout, Outcome, Site
-
-if TYPE_CHECKING:
-    from rigdda.app.barrier_checks import LayoutChecks
-
-NOTHING, CURRENT = "without it", "layout"
-"""Names of the two layouts of a study of the page."""
+from rigdda import BadInput, Error, Layout, Site
+from rigdda.app.page.known_layout import LiveFigures, Outcomes
 
 ROUNDS = (10, 25, 50, 100, 200, 400, 800, 1600)
 """Numbers of releases of each event after each round."""
@@ -42,35 +36,6 @@ take [s]: a change of the layout waits for them."""
 
 MOST_KEPT = 24
 """Number of layouts whose outcomes are remembered."""
-
-MOST_BARRIERS = 8
-"""Greatest number of barriers of a layout on the page."""
-
-Outcomes = dict[str, list[Outcome]]
-"""Outcomes of the releases with seeds 0, 1, 2, ... of each event."""
-
-
-class LiveFigures(NamedTuple):
-    """What is known of a layout."""
-
-    layout: Layout
-    releases: int
-    """Releases of each event that the figures are of; 0 before the first round has ended."""
-    costs: Mapping[str, Any] | None = None
-    """Z and its parts, a row of layouts.csv of the study."""
-    events: tuple[Mapping[str, Any], ...] = ()
-    """The rows of events.csv of the study for this layout."""
-    bare: Mapping[str, Any] | None = None
-    """Z and its parts without the layout."""
-    individual: tuple[float, float, float] | None = None
-    """Individual risk with its interval [1/year]; None without traffic."""
-    checks: LayoutChecks | None = None
-    broken: tuple[str, ...] = ()
-    """Siting rules that the layout breaks, with the reason."""
-    fault: str = ""
-    """Why the layout cannot be simulated; empty if it can."""
-    doing: str = ""
-    """What is being computed; empty if nothing is."""
 
 
 @dataclass

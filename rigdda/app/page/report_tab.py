@@ -14,7 +14,7 @@ from rigdda import BadInput
 from rigdda.agents.run_record import RECORD_FILE as RECORD
 from rigdda.app.page.forms import button, heading, paragraph, text
 from rigdda.app.page.jobs import FAILED, FINISHED, RUNNING
-from rigdda.app.page.live import CURRENT, NOTHING
+from rigdda.app.page.known_layout import CURRENT, NOTHING
 from rigdda.app.page.replays import replay_arguments
 from rigdda.app.page.state import LAYOUT
 from rigdda.app.worst_releases import WORST_FILES

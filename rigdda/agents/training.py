@@ -208,10 +208,10 @@ def learn(
         else:
             exact_gradient.learn(member, features, torch.tensor(mask), reward, seed, one)
         if z is not None:
-            known = np.isfinite(z)
-            reward = torch.tensor(np.where(known, 1.0 - z, 0.0), dtype=torch.float32)
-            own = torch.tensor(known)
-            exact_gradient.learn(member, features, own, reward, seed, one, clone=False)
+            reward = torch.tensor(np.where(mask, 1.0 - z, 0.0), dtype=torch.float32)
+            exact_gradient.learn(
+                member, features, torch.tensor(mask), reward, seed, one, clone=False
+            )
         members.append(member)
     return pointer.export(members, bare.mean, bare.scale, notes)
 

@@ -104,6 +104,30 @@ def test_outcomes_correct_what_forecasts_say(
         training.train(Terms(simulate=4), tmp_path, lambda *_: None)
 
 
+def test_layouts_that_are_not_simulated_keep_their_forecast(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Otherwise a policy would not learn to avoid them."""
+    from light_site import LIGHT
+
+    from rigdda.envs import DesignProblem
+
+    problem = DesignProblem(LIGHT)
+    found = forecasts.of_site(problem, forecast_table.load().layouts)
+    z = found.z.astype(np.float64)
+    z[-1] = np.nan  # cannot be built
+    table = ForecastTable(
+        (LIGHT.name,), forecast_table.load().layouts, np.zeros((1, WIDTH), np.float32),
+        found.features[None], z[None], {},
+    )  # fmt: skip
+    monkeypatch.setattr(outcomes, "problem", lambda name: problem)
+    corrected = outcomes.corrected(table, 0, 2)
+    simulated = np.argsort(np.where(np.isfinite(z[1:]), z[1:], np.inf))[:2] + 1
+    others = np.setdiff1d(np.arange(len(z)), simulated)
+    np.testing.assert_array_equal(corrected[others], z[others])
+    assert (corrected[simulated] != z[simulated]).all() and corrected[0] == 1.0
+
+
 def test_outcomes_and_forecasts_are_weighted_with_their_precision() -> None:
     from light_site import LIGHT
 

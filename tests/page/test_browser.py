@@ -10,23 +10,9 @@ import tomllib
 import pytest
 from light_site import LIGHT
 
+from experiments.page.driver import HANDLE, PLACE, open_tab
 from rigdda import Fence, Site, load_layout, save_layout
 from rigdda.app.cli import main
-
-PLACE = """
-([title, x, y]) => {
-  for (const document of Bokeh.documents)
-    for (const model of document._all_models.values())
-      if (model.type === "Figure" && model.title?.text === title) {
-        const view = Bokeh.index.find_one(model)
-        if (view == null) continue
-        const box = view.el.getBoundingClientRect()
-        return [box.left + view.frame.x_scale.compute(x), box.top + view.frame.y_scale.compute(y)]
-      }
-  return null
-}
-"""
-"""Where a point of a figure is in the window [pixels]."""
 
 SURVEY = """chainage,elevation
 0,45
@@ -48,20 +34,6 @@ SURVEY = """chainage,elevation
 
 TABS = ("Slope", "Falls", "Ground", "Barriers", "Decide", "Report")
 
-HANDLE = """
-words => {
-  for (const document of Bokeh.documents)
-    for (const model of document._all_models.values())
-      if (model.type === "ColumnDataSource") {
-        const column = name => model.data instanceof Map ? model.data.get(name) : model.data[name]
-        const k = Array.from(column("words") ?? []).indexOf(words)
-        if (k >= 0) return [column("x")[k], column("y")[k]]
-      }
-  return null
-}
-"""
-"""Where the handle of a name is in its figure [m]."""
-
 
 def _drag(tab, title, words, change, done):
     """Drag a handle until something is done; a busy browser may miss the first attempt."""
@@ -80,10 +52,6 @@ def _drag(tab, title, words, change, done):
                 return
             tab.wait_for_timeout(50)
     raise AssertionError(f"{words} was not dragged")
-
-
-def _open(tab, name):
-    tab.locator(".bk-tab", has_text=name).click()
 
 
 def _wait(done, seconds=90.0):
@@ -130,7 +98,7 @@ def project(tmp_path):
 def test_a_fence_is_dragged_and_its_figures_are_those_of_the_command(serve, tab, project, capsys):
     LIGHT.save(project / "site.toml")
     tab.goto(serve(project).address)
-    _open(tab, "Barriers")
+    open_tab(tab, "Barriers")
     tab.get_by_role("button", name="Add fence").click()
     _wait(lambda: len(_layout(project)) == 1)
     fence = _layout(project)[0]
@@ -171,9 +139,9 @@ def test_a_forbidden_layout_tells_why_and_markup_is_text(serve, tab, project):
     tab.goto(serve(project).address)
     tab.get_by_role("heading", name=mark).wait_for()
     for name in TABS:
-        _open(tab, name)
+        open_tab(tab, name)
         tab.wait_for_timeout(400)
-    _open(tab, "Barriers")
+    open_tab(tab, "Barriers")
     tab.get_by_text("the road begins at 34.8").wait_for()
     assert tab.locator("img[src=x]").count() == 0
     assert tab.title() != "bad"
@@ -200,18 +168,18 @@ def test_from_a_survey_to_a_search_that_survives_its_server(serve, chromium, tab
     _drag(tab, "Section of the slope", f"lower end of {site.sources[0].name}", (-2.0, 2.0),
           lambda: band()[1] != end)  # fmt: skip
     assert band()[1] == pytest.approx(end - 2.0, abs=0.5)
-    _open(tab, "Falls")
+    open_tab(tab, "Falls")
     tab.get_by_text("Nothing is released yet.").wait_for()
     tab.get_by_role("button", name="Release 200").click()
     tab.get_by_text("200 of 200 releases").wait_for()
     other = chromium.new_page(viewport={"width": 1280, "height": 720})
     other.goto(server.address)
-    _open(other, "Barriers")
-    _open(tab, "Barriers")
+    open_tab(other, "Barriers")
+    open_tab(tab, "Barriers")
     tab.get_by_role("button", name="Add fence").click()
     other.get_by_text("1. fence").wait_for(timeout=20_000)  # the tabs show the same project
     other.close()
-    _open(tab, "Decide")
+    open_tab(tab, "Decide")
     tab.get_by_role("button", name="Start the search").click()
     _wait((project / "search.job.json").exists)
     _wait(lambda: any(project.glob("design-*/evaluations.csv")), 240.0)
@@ -219,7 +187,7 @@ def test_from_a_survey_to_a_search_that_survives_its_server(serve, chromium, tab
     server.kill()
     server.start()
     tab.goto(server.address)
-    _open(tab, "Decide")
+    open_tab(tab, "Decide")
     tab.get_by_text("The search is interrupted").wait_for()
     assert (load_layout(project / "layout.toml"), Site.load(project / "site.toml")) == before
     tab.get_by_role("button", name="Resume").click()
@@ -237,11 +205,11 @@ def test_the_first_click_counts_and_the_console_is_quiet(serve, tab, project):
     tab.on("response", lambda r: said.append(r.url) if r.status >= 400 else None)
     LIGHT.save(project / "site.toml")
     tab.goto(serve(project).address)
-    _open(tab, "Falls")
+    open_tab(tab, "Falls")
     tab.get_by_role("button", name="Release 200").click()
     tab.get_by_text("200 of 200 releases").wait_for()
     for name in TABS:
-        _open(tab, name)
+        open_tab(tab, name)
         tab.wait_for_timeout(500)
     tab.get_by_text("What goes into the report").wait_for()
     assert said == []
@@ -252,7 +220,7 @@ def test_observations_are_added_and_the_match_follows_a_slider(serve, tab, proje
     runs = project.parent / "runs.csv"
     runs.write_text("event,run_out_m\n" + "".join(f"block,{x}\n" for x in (33.0, 38.0, 41.5)))
     tab.goto(serve(project).address)
-    _open(tab, "Ground")
+    open_tab(tab, "Ground")
     tab.get_by_text("No observations yet.").wait_for()
     tab.locator("input[type=file]:visible").set_input_files(runs)
     tab.wait_for_timeout(500)

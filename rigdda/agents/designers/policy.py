@@ -101,8 +101,7 @@ def decide(
     policy : Policy
         The policy.
     problem : DesignProblem
-        The problem. Layouts that it does not allow are left out, and so are those of which the
-        capital cost alone exceeds Z without barriers, as they cannot pay.
+        The problem. Layouts that it does not allow are left out.
     crossings : CrossingEnsemble, optional
         Releases without barriers; by default those of a table of forecasts are simulated.
 
@@ -112,9 +111,7 @@ def decide(
         If a simulation without barriers diverges.
     """
     found = of_site(problem, policy.layouts, crossings)
-    most = problem.nothing.objective
-    pays = [one is not None and problem.site.annual(one) <= most for one in found.layouts]
-    layout = found.layouts[int(policy.choose(found.features, np.isfinite(found.z) & pays))]
+    layout = found.layouts[int(policy.choose(found.features, np.isfinite(found.z)))]
     assert layout is not None  # no barrier is always possible
     return layout
 

@@ -30,8 +30,8 @@ def corrected(table: ForecastTable, row: int, count: int) -> Floats:
     """Return Z over Z without barriers of the layouts of a site, corrected by simulation, (A,).
 
     The `count` layouts with the least forecast Z are simulated. Their forecast and their outcome
-    are weighted with their precision. All other layouts except no barrier are NaN, as if they could
-    not be built, because their forecasts were not corrected.
+    are weighted with their precision. All others keep their forecast, so that a policy still learns
+    to avoid them; NaN for layouts that cannot be built.
 
     Raises
     ------
@@ -45,8 +45,7 @@ def corrected(table: ForecastTable, row: int, count: int) -> Floats:
     layouts: list[Layout] = [(), *(placed(menu, table.layouts[i]) or () for i in chosen)]
     sizes = {name: largest(posed.site, name) for name in posed.site.event_names}
     shares, variances = simulated_shares(posed, layouts, sizes)
-    out = np.full(len(forecast), np.nan)
-    out[0] = 1.0
+    out = forecast.copy()
     for k, i in enumerate(chosen, 1):
         annual = posed.site.annual(layouts[k]) / max(posed.nothing.objective, 1e-9)
         out[i] = annual + _remaining(posed, shares[k], variances[k], forecast[i] - annual)

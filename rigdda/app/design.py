@@ -117,7 +117,7 @@ def design(
             problem, name, simulations, seed, progress, store, precision, interim
         )
         layouts = [*known, *_found(name, result, rule, unchecked)]
-        cases = _verified(verification, layouts, precision, begun, tick, tell)
+        cases = _verified(problem, verification, layouts, precision, begun, tick, tell)
         for case in cases:
             file.add(Entry(result.simulations, "verification", case.evaluation))
         front: tuple[TriedLayout, ...] = ()
@@ -198,6 +198,7 @@ def _searched(
 
 
 def _verified(
+    problem: DesignProblem,
     verification: Verification,
     layouts: Sequence[tuple[str, Layout]],
     precision: float,
@@ -216,8 +217,12 @@ def _verified(
             tick(begun + i * n, f"verifying: {case}")
             cases.append(VerifiedLayout(case, verification.evaluate(layout, stage)))
         tell(cases)
-        # the layout without checks cannot be built and is therefore no alternative
-        choices = [case.evaluation for case in cases if case.name != WITHOUT_CHECKS]
+        last = layouts[-1][1]  # layouts that may not be built are no alternatives to it
+        choices = [
+            case.evaluation
+            for case, (_, layout) in zip(cases, layouts, strict=True)
+            if layout == last or problem.fits(layout)
+        ]
         if precision > 0.0 and verification.decided(choices, precision):
             break
     return cases

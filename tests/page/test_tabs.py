@@ -90,6 +90,7 @@ def test_what_is_odd_on_a_site_is_told_when_it_is_found(host):
     site = host.project.site
     host.project.set_value(("road", "end"), site.road.start + 0.6)
     tab.show()
+    tab.tick()
     latest = time.monotonic() + 60.0
     while tab._checks.found is None:
         assert time.monotonic() < latest

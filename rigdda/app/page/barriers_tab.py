@@ -276,10 +276,14 @@ class BarriersTab:
 
 
 def ways(falls: list[Fall], colour: Callable[[Fall], str]) -> dict[str, list[Any]]:
-    """Return the data of paths for a section."""
+    """Return the data of paths for a section, rounded to centimetres.
+
+    Lists are sent in one message. Bokeh would send each array in two messages of its own, and
+    hundreds of messages take longer than the simulation.
+    """
     return {
-        "xs": [fall.x for fall in falls],
-        "ys": [fall.y for fall in falls],
+        "xs": [fall.x.round(2).tolist() for fall in falls],
+        "ys": [fall.y.round(2).tolist() for fall in falls],
         "colour": [colour(fall) for fall in falls],
         "words": [f"{fall.event}, seed {fall.seed}: {fall.end}" for fall in falls],
     }

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import partial
 
 import panel as pn
+from bokeh.models import Tooltip
 
 from rigdda import BadInput, Error
 from rigdda.app.page.forms import button, text
@@ -22,10 +23,6 @@ TICK = 50
 
 RARELY = 20
 """Number of such looks between two looks at the files on disk."""
-
-
-FIRST = 10
-"""Number of looks after which the figures of the layout are computed; the page is shown before."""
 
 TABS = ("Slope", "Falls", "Ground", "Barriers", "Decide", "Report")
 """Titles of the tabs in the order of use. The tab Slope is `slope_tab.SlopeTab`, and so on."""
@@ -59,10 +56,17 @@ class Page:
         self.workspace, self.project, self.theme = workspace, workspace.project, theme
         self._seen = -1
         self._count = 0
+        self._loaded = False
         self._message = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._title = pn.pane.HTML("", margin=(6, 8), sizing_mode="stretch_width")
-        self._undo = button("Undo", lambda: self.act(self.project.undo), width=90)
-        self._redo = button("Redo", lambda: self.act(self.project.redo), width=90)
+        # their texts change with each edit; a new model would make Bokeh look at all others again
+        self._undo_words, self._redo_words = (Tooltip(position="bottom") for _ in range(2))
+        self._undo = button(
+            "Undo", lambda: self.act(self.project.undo), width=90, description=self._undo_words
+        )
+        self._redo = button(
+            "Redo", lambda: self.act(self.project.redo), width=90, description=self._redo_words
+        )
         self._reread = button("Read the file again", self._read_again, visible=False)
         self._keep = button("Keep what the page shows", self._keep_mine, visible=False)
         self._built: dict[str, Tab] = {}
@@ -92,6 +96,7 @@ class Page:
             pn.state.add_periodic_callback(self._tick, TICK)
         else:  # Bokeh locks the document while its own callbacks run
             document.add_periodic_callback(partial(holding, self._tick), TICK)
+        pn.state.onload(self._load)
 
     @property
     def active(self) -> Tab:
@@ -147,7 +152,14 @@ class Page:
         self._seen = -1
         locked(self._refresh)
 
+    def _load(self) -> None:
+        """Begin with work in threads, which would delay the page before the browser shows it."""
+        self._loaded = True
+        threading.Thread(target=_import_tabs, name="tabs", daemon=True).start()
+
     def _tick(self) -> None:
+        if not self._loaded:
+            return
         self._count += 1
         if self._count % RARELY == 0 and not self._keep.visible:
             try:
@@ -158,9 +170,7 @@ class Page:
                 self._reread.visible = self._keep.visible = True
         if self._seen != self.project.revision:
             self._refresh()
-        if self._count == FIRST:  # the other tabs open sooner, and this one is shown already
-            threading.Thread(target=_import_tabs, name="tabs", daemon=True).start()
-        if self._count >= FIRST and self.project.has_site and not self.workspace.draws:
+        if self.project.has_site and not self.workspace.draws:
             others = tuple(self.project.alternatives.values())
             self.workspace.live.ask(self.project.site, self.project.layout, others)
         self.workspace.write_study()
@@ -178,8 +188,8 @@ class Page:
             f"<span style='{quiet}'>{html.escape(where)}</span>"
         )
         self._undo.disabled, self._redo.disabled = not project.undoes, not project.redoes
-        self._undo.description = f"Undo: {project.undoes}" if project.undoes else None
-        self._redo.description = f"Redo: {project.redoes}" if project.redoes else None
+        self._undo_words.content = f"Undo: {project.undoes or 'nothing'}"
+        self._redo_words.content = f"Redo: {project.redoes or 'nothing'}"
         tab = self.active
         tab.show()
         place = self._tabs[self._tabs.active]

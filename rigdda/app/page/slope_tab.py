@@ -78,7 +78,6 @@ class SlopeTab:
         )
         near = site.slope.points if len(site.slope.points) <= MOST else ()
         self._points.show({"x": [p[0] for p in near], "y": [p[1] for p in near]})
-        self._checks.ask(site, self.project.where.site)
         structure = _structure(site)
         if structure != self._structure:
             self._structure = structure
@@ -87,7 +86,9 @@ class SlopeTab:
             one.refresh()
 
     def tick(self) -> None:
-        """Show what was found on the site meanwhile."""
+        """Check a site that has changed, and show what was found."""
+        if self.project.has_site:
+            self._checks.ask(self.project.site, self.project.where.site)
         found = self._checks.found
         if found is not None and found is not self._told:
             self._told = found

@@ -1,4 +1,4 @@
-"""A site file from a surveyed profile, with a comment on every field."""
+"""Creation of a site file from a surveyed profile, with a comment on every field."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ RANGE = re.compile(r"(.+?):\s*([+-]?[\d.]+)\s*(?:-|to|\.\.)\s*([+-]?[\d.]+)")
 
 
 class SiteRequest(NamedTuple):
-    """What is asked of a new site, in the chainages of the survey [m]."""
+    """Requested properties of a new site, in chainages of the survey [m]."""
 
     road: Span | None = None
     toe: float | None = None
@@ -142,7 +142,7 @@ def compose(name: str, file: Path, request: SiteRequest) -> tuple[str, Profile]:
     file : Path
         The survey, a CSV file or a DXF drawing.
     request : SiteRequest
-        What is known beside the profile; the rest is filled with placeholders.
+        What is known in addition to the profile; all other values are placeholders.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def file_of(name: str, out: Path | None) -> Path:
     Raises
     ------
     BadInput
-        If the name is none of a file, or the file has another ending.
+        If the name cannot be that of a file, or the file has another ending.
     """
     if out is None:
         if not re.fullmatch(r"[\w][\w .()-]*", name):
@@ -183,7 +183,7 @@ def write(path: Path, text: str) -> None:
         If there is a file of that name, which may have been edited.
     """
     if path.exists():
-        hint = "name another file, or remove this one: a file that may be edited is not replaced"
+        hint = "name another file, or remove this one: it may have been edited and is not replaced"
         raise BadInput("--out", str(path), hint)
     with atomic(path) as part:
         part.write_text(text, encoding="utf-8")
@@ -301,7 +301,7 @@ class _Draft:
         return round(float(min(self.x[1:][steep][-1], most)), 3)
 
     def _asked(self) -> Span | None:
-        """Return the zone for barriers that is asked for, which lies from the crest to the road."""
+        """Return the requested barrier zone, which must lie between the crest and the road."""
         if self.request.zone is None:
             return None
         origin, road = self.profile.origin, self.request.road
@@ -319,7 +319,7 @@ class _Draft:
     def _road(self) -> Span:
         """Return the edges of the road, and check that the ground goes on beyond it.
 
-        A road that is not given lies below the zone for barriers that is.
+        If the barrier zone is given but the road is not, the road lies below the zone.
         """
         origin, end = self.profile.origin, float(self.x[-1])
         if self.request.road is not None:
@@ -341,7 +341,7 @@ class _Draft:
         return round(low, 3), round(high, 3)
 
     def _sources(self) -> list[tuple[str, Span, str]]:
-        """Return the name of each source, its band and how sure that is."""
+        """Return the name of each source, its band and whether the band was given."""
         found, origin = [], self.profile.origin
         for text in self.request.sources:
             name, span = _ranged("--source", text, origin)
@@ -418,7 +418,7 @@ class _Draft:
         high = low + max((self.toe - low) / 3.0, SHORTEST)
         most = self.road[0] - 2.0 * reach
         if not low < most:
-            hint = "give where loose rock lies by --source NAME:START-END, clear of the road"
+            hint = "say where loose rock lies with --source NAME:START-END, clear of the road"
             raise BadInput("--source", None, hint)
         high = min(high, most)
         if self.asked is not None:
@@ -521,7 +521,7 @@ class _Draft:
         return Part("[[forest]]", Forest, edges | values | kept, template=True)
 
     def _grounds(self) -> tuple[str, list[dict[str, Any]], dict[str, str]]:
-        """Return the surface of all that is not listed, the stretches, and the grounds."""
+        """Return the surface outside the stretches, the stretches, and the grounds."""
         origin, base, given = self.profile.origin, None, []
         grounds = {"rock": USUAL["rock"], "soil": USUAL["soil"]}
         for text in self.request.grounds:

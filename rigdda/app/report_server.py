@@ -1,9 +1,9 @@
 """A report in a browser on this machine, beside the replay of a release in the Rerun viewer.
 
 Rerun has no setting for the time at which its viewer opens a recording. The replay that is shown
-first is therefore recorded again from shortly before the first impact; the whole one is a click
-away. Nothing leaves the machine: the viewer's pages are passed on with a policy that forbids the
-browser every other address.
+first is therefore recorded again from shortly before the first impact; a link opens the whole
+replay. Nothing is sent to other machines: the pages of the viewer are passed on with a policy that
+does not allow the browser to contact any other address.
 """
 
 from __future__ import annotations

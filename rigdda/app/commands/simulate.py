@@ -64,7 +64,7 @@ def simulate(
 
     Writes, each as CSV and Parquet: stations and along_slope (energies, velocity, bounce height and
     passing rate, with quantiles and intervals), passages (every passage at a station), run_out,
-    stopping and stops (where rock stops, also beyond the road). Writes pictures (section.png,
+    stopping and stops (where rock stops, also beyond the road). Also writes pictures (section.png,
     along_slope.png, run_out.png, and one for each station), outcomes.csv and run.npz (the first
     release). With --model lumped, writes points.csv only. A run that was interrupted continues
     where it stopped.
@@ -106,13 +106,13 @@ def simulate(
     for line, table in stations.tables(rows):
         click.echo(line)
         show(table)
-    click.echo("intervals: 95 %; ?: too few blocks for this end; height: of the centre of a block")
+    click.echo("95 % intervals; ?: too few blocks for this end; height: of the centre of a block")
     note(findings.of_layout(where, barriers, event))
     warn_of_placeholders(site)
     note(stations.undecided(passing))
     note(stations.lower_bound(rest))
     if passing.not_drawn:
         names = ", ".join(passing.not_drawn)
-        note(f"no release is of {names}: give --event to simulate one of them, or more releases")
+        note(f"no release of {names} was drawn: name one with --event, or give more --releases")
     resumed = f", {found.resumed:,} from an interrupted run" if found.resumed else ""
     click.echo(f"{releases:,} releases{resumed}; tables and pictures are in {folder}")

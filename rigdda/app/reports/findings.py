@@ -143,7 +143,7 @@ def is_existing(failed: FailedCheck) -> bool:
 
 
 def _times(use: float) -> str:
-    """Return a utilisation with two decimals below 10, and in whole above."""
+    """Return a utilisation with two decimals below 10, and as a whole number above."""
     if use > EXCESSIVE_USE:
         return f"more than {EXCESSIVE_USE:,.0f}"
     return f"{use:.2f}" if use < 9.995 else f"{use:,.0f}"

@@ -4,9 +4,9 @@ The section shows the trajectories of blocks, the barriers, and envelopes of the
 energies of the blocks. Further pictures show what passes along the slope and at a station, where
 blocks stop, and cost against risk.
 
-The picture of the rule answers where a fence of a given class would do: the demanded energy between
-the classes of the catalogue, the needed height between their greatest heights, and for each class
-the stretches where it satisfies the rule.
+The picture of the rule shows where a fence of a given class is sufficient: the demanded energy
+between the classes of the catalogue, the needed height between their greatest heights, and for each
+class the stretches where it satisfies the rule.
 """
 
 from __future__ import annotations

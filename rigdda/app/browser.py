@@ -27,7 +27,7 @@ APPLICATIONS = (
     "/Applications/Chromium.app/Contents/MacOS/Chromium",
     "/Applications/Microsoft Edge.app/Contents/MacOS/Microsoft Edge",
 )
-"""Where they are on macOS, where they are not on the search path."""
+"""Their places on macOS, where they are not on the search path."""
 
 LONGEST_PRINTING = 120.0
 """Longest time that a browser may take to print [s]."""

@@ -16,8 +16,8 @@ BEST = "best so far"
 """Name of the best layout of an unfinished search."""
 
 FIRST = 1000
-"""Number of releases of a search after which its best layout is told for the first time. It is told
-again after twice as many, and so on."""
+"""Number of releases of a search after which its best layout is shown for the first time. It is
+shown again after twice as many, and so on."""
 
 
 class InterimAnswer:

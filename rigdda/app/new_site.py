@@ -46,7 +46,7 @@ SURVEYED = "surveyed"
 GIVEN = "given"
 PLACEHOLDER = "placeholder: replace"
 CHECK_DEFAULT = "default: check"
-"""How sure a value is, as its comment says."""
+"""Origins of values, as the comments in the file give them."""
 
 SLOPE_DEG, FACE_DEG = 25.0, 40.0
 """Inclination of the ground above which it is slope rather than its foot, and a face [deg]."""
@@ -89,7 +89,7 @@ BLOCK = 0.8
 """Edge of the placeholder of a block on ground that overhangs [m]."""
 
 BLOCK_GAP = 0.01
-"""Height of this block above the ground [m]: it shall not reach into it by rounding."""
+"""Height of this block above the ground [m], so that rounding does not move it into the ground."""
 
 PROFILE_SPEED = 3.0
 """Mean speed along the whole profile for which the simulated time is enough [m/s]."""
@@ -108,7 +108,7 @@ class SiteRequest(NamedTuple):
     toe: float | None = None
     zone: Span | None = None
     grounds: Sequence[str] = ()
-    """NAME:START-END, or NAME for all the rest."""
+    """NAME:START-END, or NAME for all other ground."""
     sources: Sequence[str] = ()
     """NAME:START-END."""
     masses: Sequence[str] = ()
@@ -205,7 +205,7 @@ class Part(NamedTuple):
     table: type[msgspec.Struct]
     """The class that reads it."""
     values: Mapping[str, tuple[Any, str]]
-    """The value of each field that is written, and how sure it is."""
+    """The value of each field that is written, and its origin."""
     comments: Sequence[str] = ()
     """Lines after the fields."""
     template: bool = False
@@ -341,7 +341,7 @@ class _Draft:
         return round(low, 3), round(high, 3)
 
     def _sources(self) -> list[tuple[str, Span, str]]:
-        """Return the name of each source, its band and whether the band was given."""
+        """Return the name of each source, its band and the origin of the band."""
         found, origin = [], self.profile.origin
         for text in self.request.sources:
             name, span = _ranged("--source", text, origin)

@@ -46,13 +46,13 @@ LONGEST_START = 30.0
 """Longest time that the viewer may take to start [s]."""
 
 PAGES_POLICY = "default-src 'self'; style-src 'unsafe-inline'; img-src data:"
-"""What the browser may load for the report: nothing but itself."""
+"""Content that the browser may load for the report: nothing but the report itself."""
 
 VIEWER_POLICY = (
     "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; "
     "style-src 'self' 'unsafe-inline'"
 )
-"""What the browser may load for the viewer: nothing from another machine."""
+"""Content that the browser may load for the viewer: nothing from another machine."""
 
 ELSEWHERE = re.compile(rb"<link[^>]*https://[^>]*>", re.DOTALL)
 """Links of the viewer's page to other machines."""

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 CUTS = 20
-"""Times that a jointed mass is cut to tell its blocks."""
+"""Number of times that a jointed mass is cut to describe its blocks."""
 
 TIMED_RELEASES = 3
 """Releases of each event that are timed."""
@@ -40,11 +40,11 @@ class Trial(NamedTuple):
 
     event: str
     steps: int
-    """Most time steps of a release."""
+    """Greatest number of time steps of a release."""
     seconds: float
-    """Processor time of one, mean [s]."""
+    """Mean processor time of a release [s]."""
     cut_off: bool
-    """Whether rock above the road still moved at the end of one."""
+    """Whether rock above the road still moved at the end of a release."""
 
 
 def facts(site: Site) -> list[str]:

@@ -43,7 +43,7 @@ SPARSE, DENSE = 2.0, 90.0
 """Basal areas beyond which a forest is doubted [m2/ha]; dense protection forest has about 50."""
 
 HIGH_UP = 15.0
-"""Height above which stems are not thought to take their energy [m]."""
+"""Height above which it is doubted that stems take their energy [m]."""
 
 HUGE = 20.0
 """Volume of a block above which an area may have been meant for one [m3]."""
@@ -58,7 +58,7 @@ SLOW_LOOSE_BLOCKS, SLOW_MASS_BLOCKS = 100, 1000
 """Numbers of loose blocks, and of blocks of a mass, from which on a release is slow."""
 
 LEAST_SHARE = 0.01
-"""Share of a band that is worth a word if blocks may stay where they are on it [-]."""
+"""Share of a band from which it is reported that blocks may stay where they are on it [-]."""
 
 FARTHER = 3.0
 """Length of the road over that of the slope on which events were counted, from which on it is
@@ -72,7 +72,7 @@ SIZE_LIMITS = {"height": "max_height", "depth": "max_depth", "width": "max_width
 """Limits of the zone for sizes of barriers."""
 
 DOUBTED_PRICE_FACTOR = 20.0
-"""Factor on a usual price, either way, beyond which its unit is doubted."""
+"""Factor above or below a usual price beyond which its unit is doubted."""
 
 NO_CHARGE = ("fence_base", "ditch_base", "removal", "clearing")
 """Prices that may well be 0."""

@@ -160,7 +160,7 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
 FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*]')
-"""Characters that some operating system does not allow in the name of a folder."""
+"""Characters that some operating systems do not allow in the name of a folder."""
 
 LONGEST_FOLDER_NAME = 200
 """Greatest length of the name of a folder [bytes]; operating systems allow 255."""

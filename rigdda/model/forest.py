@@ -37,7 +37,7 @@ CONIFER, BROADLEAVED = 0.93, 1.59
 """Mean fracture energy of conifers and of broadleaved trees relative to silver fir [-]."""
 
 SHARE_LEAST, SHARE_RISE, SHARE_MIDDLE, SHARE_STEEPNESS = -0.046, 1.026, 0.58, 8.007
-"""Constants of the share of the energy that is taken off the axis, see `share` [-]."""
+"""Constants of the share of the energy that is taken in an impact off the axis, see `share` [-]."""
 
 HECTARE = 1e4
 """[m2]"""

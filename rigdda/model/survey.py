@@ -76,7 +76,7 @@ LOCAL = 1000.0
 [m]."""
 
 ROUND = 100.0
-"""An offset is a whole multiple of this [m], so that it is easily added in the head."""
+"""An offset is a whole multiple of this [m], so that it is easily added by mental arithmetic."""
 
 LOWEST_GROUND, SUMMIT = -450.0, 9_000.0
 """Elevations [m] beyond which there is no ground on land."""

@@ -38,7 +38,7 @@ ENSEMBLE, HEAVY_ENSEMBLE, HEAVY = 40, 6, 30
 than `HEAVY` blocks, and this number of blocks. The value network is trained with them."""
 
 FEATURE_KINDS = ("fence", "ditch", "embankment", "gravity_wall", "mesh")
-"""Kinds of barrier that the features tell apart."""
+"""Kinds of barrier that the features distinguish."""
 
 QUANTILE = 0.95
 """Quantile of energies, heights and speeds at a barrier."""

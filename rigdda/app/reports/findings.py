@@ -25,10 +25,10 @@ Money = tuple[float, float, float]
 
 
 REPORTED_REACH = 0.05
-"""Share of the releases of a design event that reach the road from which it is told [-]."""
+"""Share of the releases of a design event that reach the road from which it is reported [-]."""
 
 EXCESSIVE_USE = 1000.0
-"""Utilisation above which its value says no more; one without any capacity is infinite [-]."""
+"""Utilisation above which its value is not printed; without any capacity, it is infinite [-]."""
 
 
 class FailedCheck(NamedTuple):

@@ -330,7 +330,7 @@ def _beyond(passing: Passing, group: str, grid: Floats) -> Iterator[dict[str, An
 
 
 DEPOSIT_SHARES = (0.5, 0.95)
-"""Shares of the rock for which the chainage is told within which it comes to rest."""
+"""Shares of the rock for which the chainage within which it comes to rest is given."""
 
 
 def stopping(passing: Passing) -> Rows:

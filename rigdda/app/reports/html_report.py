@@ -136,7 +136,7 @@ def _show(exhibit: Exhibit, folder: ResultsFolder, mark: str) -> Iterator[Block]
 
 
 def summary_section(folders: Folders) -> Iterator[Block]:
-    """Yield the main result: what to build and what that saves, or which rock comes down."""
+    """Yield the main result: what to build and what it saves, or the simulated rockfall."""
     designs = [folder for folder in folders if folder.files("layouts.csv", "design")]
     for folder in designs:
         yield from _titled([*_design_blocks(folder)], f"Design in {folder.label}", len(designs) > 1)

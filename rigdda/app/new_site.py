@@ -317,7 +317,7 @@ class _Draft:
         return round(low, 3), round(high, 3)
 
     def _road(self) -> Span:
-        """Return the edges of the road, and check that the ground goes on beyond it.
+        """Return the edges of the road, and check that the ground continues beyond it.
 
         If the barrier zone is given but the road is not, the road lies below the zone.
         """
@@ -335,7 +335,7 @@ class _Draft:
             whose = "the road" if self.request.road else "the placeholder of the road (see --road)"
             hint = (
                 f"survey the ground to {LEAST_BEYOND:g} m beyond {whose}, or add the point {at} if "
-                "it goes on as its last piece does"
+                "it continues like its last segment"
             )
             raise BadInput("--profile", f"ends at chainage {origin.chainage_of(end):.10g}", hint)
         return round(low, 3), round(high, 3)

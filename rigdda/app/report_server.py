@@ -140,7 +140,7 @@ def serve(page: Path, replay: Path, say: Callable[[str], None]) -> None:
     replay : path
         The .rrd file.
     say : callable
-        Function that prints a line, which tells the address.
+        Function that prints a line with the address.
 
     Raises
     ------

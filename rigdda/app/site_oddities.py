@@ -99,7 +99,7 @@ SHORT = 1.2 * LEAST_BEYOND
 """Length of the ground beyond the road that leaves a run-out little room [m]."""
 
 FALLING_DEG = 10.0
-"""Inclination of the last piece of the ground above which rock goes on beyond it [deg]."""
+"""Inclination of the last segment of the ground above which rock continues beyond it [deg]."""
 
 SCALED = 1.2
 """Factor on the spacings of joints from which it is reported, as well as its inverse."""

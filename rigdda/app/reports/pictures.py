@@ -656,7 +656,7 @@ BINS = 30
 """Bins of a histogram."""
 
 HISTOGRAM_RATIO = 1e4
-"""Greatest energy over the least that is told apart in a histogram."""
+"""Greatest energy over the least that a histogram shows separately."""
 
 WHOLE, NORMAL = "#222222", "#b5651d"
 """Colours of all events together, and of heights normal to the slope."""

@@ -81,7 +81,7 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @click.option("--max-cost", type=RealNumber(min=0.0), metavar="EUR_PER_M",
               help="Largest capital cost of a layout in EUR per metre of road.")  # fmt: skip
 @click.option("--zone", type=RealNumber(), nargs=2, metavar="A B",
-              help="Place barriers between the chainages A and B [m], as in the site file, not of "
+              help="Place barriers between the chainages A and B [m] of the site file, not of "
               "its survey.  [default: the zone of the site]")  # fmt: skip
 @click.option("--precision", type=RealNumber(0.0, 0.5), default=PRECISION, show_default=True,
               metavar="P", help="Precision of the answer relative to Z. The verification ends when "
@@ -116,7 +116,7 @@ def design(
     seed: int,
     out: Path | None,
 ) -> None:
-    """Find the best layout of barriers on SITE and verify it.
+    """Find the best layout of barriers for SITE and verify it.
 
     SITE is the name of a built-in site or a TOML file. The layout is verified on releases that the
     search did not use. The best layout has the least cost Z of those whose barriers meet their

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 )
 @count_option("--releases", 1, 100, "Number of releases.")
 @click.option("--station", "at", type=RealNumber(), multiple=True, metavar="X",
-              help="Chainage at which passing blocks are recorded [m], as in the site file, not "
-              "of its survey. May be repeated.  "
+              help="Chainage of the site file, not of its survey, at which passing blocks are "
+              "recorded [m]. May be repeated.  "
               "[default: the uphill edge of the road]")  # fmt: skip
 @click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
               show_default=True, help="Mechanical model. 'lumped' treats each block as a point; "

@@ -1,6 +1,6 @@
 """Record of the commands that wrote a results folder: `run.json`.
 
-A folder of results says what made it: the command as it was typed, every option, the seed, the
+A results folder records how it was made: the command as it was typed, every option, the seed, the
 versions and the site as it was used. With the record, the command can be repeated, and
 `rigdda report` can document its results.
 """
@@ -129,7 +129,7 @@ def check_terms(asked: dict[str, Any], found: dict[str, Any], what: str) -> None
 
 
 def as_toml(site: Site) -> str:
-    """Return a site as the text of a site file, with all defaults; empty if TOML cannot hold it."""
+    """Return a site as the text of a site file with all defaults; empty if that is impossible."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "site.toml"
         try:
@@ -144,7 +144,7 @@ def _now() -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return the value of an option as JSON can hold it."""
+    """Return the value of an option in a form that JSON can represent."""
     if isinstance(value, tuple | list):
         return [_plain(one) for one in value]
     return value if isinstance(value, str | int | float | bool | None) else str(value)

@@ -150,17 +150,17 @@ def train(terms: Terms, out: Path, tick: Tick) -> Policy:
 
 
 def table_of(terms: Terms, out: Path, tick: Tick) -> ForecastTable:
-    """Return the table that ships, or make one of the requested number of training sites.
+    """Return the table of the package, or make one of the requested number of training sites.
 
     Raises
     ------
     BadInput
-        If the table that ships is of another version of the mechanics.
+        If the table of the package is of another version of the mechanics.
     """
     if not terms.sites:
         table = forecast_table.load()
         if table.notes["mechanics"] != MECHANICS:
-            hint = "the table that ships is of another version of the mechanics: give --sites N"
+            hint = "the table of the package is of another version of the mechanics: give --sites N"
             raise BadInput("table", table.notes["mechanics"], hint)
         return table
     folder, catalogue = out / "sites", candidates()
@@ -249,7 +249,7 @@ def methods(policy: Policy, table: ForecastTable, problem: DesignProblem) -> dic
     """Return the layouts of the policy and of the rules that it is compared with.
 
     The rules are no barrier, the constant, the engineering rule and the best layout of the family
-    that can be built (`best_of_families`), which is told the family of the site.
+    that can be built (`best_of_families`), which uses the family of the site.
     """
     menu = Menu(problem)
     order = best_of_families(table).get(sites.family_of(problem.site.name), [0])

@@ -1,7 +1,8 @@
 """Archive of a design: the outcomes of all releases that it simulated, for other prices.
 
-The motion of rock does not depend on prices, consequences and rates of events. With the outcomes,
-layouts can therefore be evaluated for other ones without simulation, see `rigdda.app.reprice`.
+The motion of rock does not depend on prices, consequences and rates of events. From the stored
+outcomes, layouts can therefore be evaluated with other prices, consequences and rates without
+simulation, see `rigdda.app.reprice`.
 """
 
 from __future__ import annotations
@@ -137,7 +138,7 @@ def archive(
 
 
 def gathered(store: Store) -> Iterator[LayoutReleases]:
-    """Yield the releases that a store keeps, for each layout every release once."""
+    """Yield the releases that a store keeps: for each layout, every release once."""
     found: dict[Layout, dict[tuple[str, int], Outcome]] = {}
     for own in store.stored_releases():
         known = found.setdefault(own.layout, {})
@@ -148,14 +149,14 @@ def gathered(store: Store) -> Iterator[LayoutReleases]:
 
 
 def _bare(site: Site, known: Ensemble) -> list[Outcome]:
-    """Return the outcomes of the releases without barriers from which an ensemble follows."""
+    """Return the outcomes of releases without barriers from which an ensemble is computed."""
     counts = {name: known.nothing.reach[name].releases for name in site.event_names}
     found = ensemble.bare_outcomes(site, counts)
     return [outcome for name in site.event_names for outcome in found[name]]
 
 
 def write(path: Path, made: Archive) -> None:
-    """Write an archive, all or nothing."""
+    """Write an archive atomically."""
     with atomic(path) as part, part.open("wb") as file:
         with gzip.GzipFile("", "wb", 6, file, mtime=0) as packed:
             packed.write(msgspec.msgpack.encode(made))
@@ -181,5 +182,5 @@ def read(folder: Path) -> Archive:
 
 
 def layout_of(tables: Sequence[dict[str, Any]]) -> Layout:
-    """Return the layout of tables of an archive."""
+    """Return the layout that tables of an archive describe."""
     return tuple(from_table(f"barriers[{i}]", table) for i, table in enumerate(tables))

@@ -1,4 +1,4 @@
-"""Checks of every barrier of a layout, each under what the barriers uphill of it let pass.
+"""Checks of every barrier of a layout, each under the blocks that pass the barriers uphill of it.
 
 The formulas are those of `rigdda.envs.barrier_formulas`.
 """

@@ -27,7 +27,7 @@ APPLICATIONS = (
     "/Applications/Chromium.app/Contents/MacOS/Chromium",
     "/Applications/Microsoft Edge.app/Contents/MacOS/Microsoft Edge",
 )
-"""Where they are on macOS, where they are not on the search path."""
+"""Their places on macOS, where they are not on the search path."""
 
 LONGEST_PRINTING = 120.0
 """Longest time that a browser may take to print [s]."""
@@ -91,7 +91,7 @@ def print_pdf(program: str, page: Path) -> Path:
             if done.returncode == 0 or _from_snap(program):
                 words = (
                     f"{program} could not print {page}: it wrote no file into {folder} that can be "
-                    "seen here, as a browser from a snap has a temporary folder of its own: set "
+                    "seen here, because a browser from a snap has its own temporary folder: set "
                     "TMPDIR to a folder in your home directory that is not hidden, such as "
                     f"{Path.home() / 'tmp'}, or install Chromium as a Debian package or Chrome"
                 )

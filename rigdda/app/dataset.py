@@ -37,7 +37,7 @@ from rigdda.seeds import derive, release_seeds
 Tick = Callable[[int, str], None]
 
 RECIPE = "dataset.json"
-"""File that records what the parts of a folder are."""
+"""File that records the recipe of the parts of a folder."""
 
 OUTCOMES = pa.schema(
     [

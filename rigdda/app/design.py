@@ -57,8 +57,8 @@ def design(
     """Design a layout, then verify it and the layouts for comparison on new releases.
 
     If the layout misses a target, the layouts of the frontier are verified as well, see
-    `with_verified_frontier`, and the best of all verified layouts is taken. The releases of this
-    choice are others than those on which the choice is verified.
+    `with_verified_frontier`, and the best of all verified layouts is chosen. The chosen layout is
+    then verified on other releases than those of this choice.
 
     `evaluations.csv` and the store `evaluations.jsonl` are written into `out` during the search,
     and the archive of all outcomes at the end. A study that was interrupted reads the evaluations
@@ -84,7 +84,8 @@ def design(
         `designers.STOPPING` when it gains less than `SEARCH` times it. With 0, or if the problem
         has targets, all releases are used.
     tell : callable
-        Called with the layouts that are known so far, the best one last, first within seconds.
+        Called with the layouts that are known so far, the best one last. The first call comes
+        within seconds.
 
     Raises
     ------
@@ -148,7 +149,7 @@ UNCHECKED = 0.5
 
 
 def search_budget(problem: DesignProblem, name: str, simulations: int) -> int:
-    """Return the releases of all searches of a study, of which the first has `simulations`."""
+    """Return the number of releases of all searches; the first search has `simulations`."""
     if problem.checks != "required" or name in SEARCHLESS:
         return simulations
     return simulations + max(2, int(UNCHECKED * simulations))
@@ -164,7 +165,7 @@ def _searched(
     precision: float,
     interim: InterimAnswer,
 ) -> tuple[DesignResult, DesignResult | None]:
-    """Return the results of a designer with and, if checks are required, without this condition.
+    """Return the results of a designer and, if checks are required, those without required checks.
 
     A layout of the second search that meets its checks is the first result if it is better: a
     barrier may meet them below another one although it would not on its own. The first result has

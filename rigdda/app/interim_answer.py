@@ -16,15 +16,16 @@ BEST = "best so far"
 """Name of the best layout of an unfinished search."""
 
 FIRST = 1000
-"""Number of releases of a search after which its best layout is told for the first time. It is told
-again after twice as many, and so on."""
+"""Number of releases of a search after which its best layout is shown for the first time. It is
+shown again after twice as many, and so on."""
 
 
 class InterimAnswer:
-    """Tells the layouts that need no search at once, and the best layout of the search so far.
+    """Shows the layouts that need no search, and later the best layout of the search so far.
 
-    All are evaluated on the first releases of the verification, so that they can be compared and
-    the best one is not flattered. No search sees these evaluations.
+    All layouts are evaluated on the first releases of the verification. They can therefore be
+    compared, and the evaluation of the best one is not biased by the search, which does not use
+    these releases.
 
     Parameters
     ----------
@@ -41,13 +42,13 @@ class InterimAnswer:
         self._next = FIRST
 
     def begin(self, cases: Sequence[tuple[str, Layout]]) -> None:
-        """Evaluate the layouts that need no search and tell them."""
+        """Evaluate the layouts that need no search and show them."""
         for name, layout in cases:
             self._cases.append(VerifiedLayout(name, self._verification.evaluate(layout)))
         self._tell(tuple(self._cases))
 
     def consider(self, entry: Entry) -> None:
-        """Take account of an evaluation of the search, and tell the best layout now and then.
+        """Take account of an evaluation of the search, and show the best layout from time to time.
 
         The best layout has the lowest upper end of the interval of Z, because the lowest Z of many
         layouts with few releases is often due to chance.

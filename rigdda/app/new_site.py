@@ -1,4 +1,4 @@
-"""A site file from a surveyed profile, with a comment on every field."""
+"""Creation of a site file from a surveyed profile, with a comment on every field."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ SURVEYED = "surveyed"
 GIVEN = "given"
 PLACEHOLDER = "placeholder: replace"
 CHECK_DEFAULT = "default: check"
-"""How sure a value is, as its comment says."""
+"""Origins of values, as the comments in the file give them."""
 
 SLOPE_DEG, FACE_DEG = 25.0, 40.0
 """Inclination of the ground above which it is slope rather than its foot, and a face [deg]."""
@@ -89,7 +89,7 @@ BLOCK = 0.8
 """Edge of the placeholder of a block on ground that overhangs [m]."""
 
 BLOCK_GAP = 0.01
-"""Height of this block above the ground [m]: it shall not reach into it by rounding."""
+"""Height of this block above the ground [m], so that rounding does not move it into the ground."""
 
 PROFILE_SPEED = 3.0
 """Mean speed along the whole profile for which the simulated time is enough [m/s]."""
@@ -102,13 +102,13 @@ RANGE = re.compile(r"(.+?):\s*([+-]?[\d.]+)\s*(?:-|to|\.\.)\s*([+-]?[\d.]+)")
 
 
 class SiteRequest(NamedTuple):
-    """What is asked of a new site, in the chainages of the survey [m]."""
+    """Requested properties of a new site, in chainages of the survey [m]."""
 
     road: Span | None = None
     toe: float | None = None
     zone: Span | None = None
     grounds: Sequence[str] = ()
-    """NAME:START-END, or NAME for all the rest."""
+    """NAME:START-END, or NAME for all other ground."""
     sources: Sequence[str] = ()
     """NAME:START-END."""
     masses: Sequence[str] = ()
@@ -142,7 +142,7 @@ def compose(name: str, file: Path, request: SiteRequest) -> tuple[str, Profile]:
     file : Path
         The survey, a CSV file or a DXF drawing.
     request : SiteRequest
-        What is known beside the profile; the rest is filled with placeholders.
+        What is known in addition to the profile; all other values are placeholders.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def file_of(name: str, out: Path | None) -> Path:
     Raises
     ------
     BadInput
-        If the name is none of a file, or the file has another ending.
+        If the name cannot be that of a file, or the file has another ending.
     """
     if out is None:
         if not re.fullmatch(r"[\w][\w .()-]*", name):
@@ -183,7 +183,7 @@ def write(path: Path, text: str) -> None:
         If there is a file of that name, which may have been edited.
     """
     if path.exists():
-        hint = "name another file, or remove this one: a file that may be edited is not replaced"
+        hint = "name another file, or remove this one: it may have been edited and is not replaced"
         raise BadInput("--out", str(path), hint)
     with atomic(path) as part:
         part.write_text(text, encoding="utf-8")
@@ -205,7 +205,7 @@ class Part(NamedTuple):
     table: type[msgspec.Struct]
     """The class that reads it."""
     values: Mapping[str, tuple[Any, str]]
-    """The value of each field that is written, and how sure it is."""
+    """The value of each field that is written, and its origin."""
     comments: Sequence[str] = ()
     """Lines after the fields."""
     template: bool = False
@@ -301,7 +301,7 @@ class _Draft:
         return round(float(min(self.x[1:][steep][-1], most)), 3)
 
     def _asked(self) -> Span | None:
-        """Return the zone for barriers that is asked for, which lies from the crest to the road."""
+        """Return the requested barrier zone, which must lie between the crest and the road."""
         if self.request.zone is None:
             return None
         origin, road = self.profile.origin, self.request.road
@@ -317,9 +317,9 @@ class _Draft:
         return round(low, 3), round(high, 3)
 
     def _road(self) -> Span:
-        """Return the edges of the road, and check that the ground goes on beyond it.
+        """Return the edges of the road, and check that the ground continues beyond it.
 
-        A road that is not given lies below the zone for barriers that is.
+        If the barrier zone is given but the road is not, the road lies below the zone.
         """
         origin, end = self.profile.origin, float(self.x[-1])
         if self.request.road is not None:
@@ -335,13 +335,13 @@ class _Draft:
             whose = "the road" if self.request.road else "the placeholder of the road (see --road)"
             hint = (
                 f"survey the ground to {LEAST_BEYOND:g} m beyond {whose}, or add the point {at} if "
-                "it goes on as its last piece does"
+                "it continues like its last segment"
             )
             raise BadInput("--profile", f"ends at chainage {origin.chainage_of(end):.10g}", hint)
         return round(low, 3), round(high, 3)
 
     def _sources(self) -> list[tuple[str, Span, str]]:
-        """Return the name of each source, its band and how sure that is."""
+        """Return the name of each source, its band and the origin of the band."""
         found, origin = [], self.profile.origin
         for text in self.request.sources:
             name, span = _ranged("--source", text, origin)
@@ -418,7 +418,7 @@ class _Draft:
         high = low + max((self.toe - low) / 3.0, SHORTEST)
         most = self.road[0] - 2.0 * reach
         if not low < most:
-            hint = "give where loose rock lies by --source NAME:START-END, clear of the road"
+            hint = "say where loose rock lies with --source NAME:START-END, clear of the road"
             raise BadInput("--source", None, hint)
         high = min(high, most)
         if self.asked is not None:
@@ -521,7 +521,7 @@ class _Draft:
         return Part("[[forest]]", Forest, edges | values | kept, template=True)
 
     def _grounds(self) -> tuple[str, list[dict[str, Any]], dict[str, str]]:
-        """Return the surface of all that is not listed, the stretches, and the grounds."""
+        """Return the surface outside the stretches, the stretches, and the grounds."""
         origin, base, given = self.profile.origin, None, []
         grounds = {"rock": USUAL["rock"], "soil": USUAL["soil"]}
         for text in self.request.grounds:

@@ -11,9 +11,9 @@ from rigdda.envs.arrivals import ReleaseRate, release_rates, with_release_rates
 
 
 def released(site: Site | str | os.PathLike[str]) -> Site:
-    """Return a site, or that of a name or a file, with the rates of releases of all events.
+    """Return a site, which may be given by name or file, with all rates as those of releases.
 
-    For each event whose rate is that of arrivals, a note tells the rates and their ratio.
+    For each event whose rate is that of arrivals, a note gives both rates and their ratio.
 
     Raises
     ------

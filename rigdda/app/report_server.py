@@ -1,9 +1,9 @@
 """A report in a browser on this machine, beside the replay of a release in the Rerun viewer.
 
 Rerun has no setting for the time at which its viewer opens a recording. The replay that is shown
-first is therefore recorded again from shortly before the first impact; the whole one is a click
-away. Nothing leaves the machine: the viewer's pages are passed on with a policy that forbids the
-browser every other address.
+first is therefore recorded again from shortly before the first impact; a link opens the whole
+replay. Nothing is sent to other machines: the pages of the viewer are passed on with a policy that
+does not allow the browser to contact any other address.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ LONGEST_START = 30.0
 """Longest time that the viewer may take to start [s]."""
 
 PAGES_POLICY = "default-src 'self'; style-src 'unsafe-inline'; img-src data:"
-"""What the browser may load for the report: nothing but itself."""
+"""Content that the browser may load for the report: nothing but the report itself."""
 
 VIEWER_POLICY = (
     "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; "
     "style-src 'self' 'unsafe-inline'"
 )
-"""What the browser may load for the viewer: nothing from another machine."""
+"""Content that the browser may load for the viewer: nothing from another machine."""
 
 ELSEWHERE = re.compile(rb"<link[^>]*https://[^>]*>", re.DOTALL)
 """Links of the viewer's page to other machines."""
@@ -140,7 +140,7 @@ def serve(page: Path, replay: Path, say: Callable[[str], None]) -> None:
     replay : path
         The .rrd file.
     say : callable
-        Function that prints a line, which tells the address.
+        Function that prints a line with the address.
 
     Raises
     ------

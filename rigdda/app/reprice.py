@@ -262,7 +262,7 @@ class ArchivedProblem(DesignProblem):
 
 @dataclass(frozen=True, slots=True)
 class ScoredLayout:
-    """A layout of the search and what its releases say at the new values.
+    """A layout of the search with the results of its releases for the new values.
 
     Parameters
     ----------
@@ -401,7 +401,7 @@ VERIFIED = ("verification", CHOICE_STREAM)
 
 
 def _candidates(problem: ArchivedProblem, kept: Archive) -> dict[Layout, ScoredLayout]:
-    """Return every layout of the archive with what its releases say at the new values."""
+    """Return every layout of the archive with the results of its releases for the new values."""
     bare = account(problem.site, (), kept.bare)
     spent = {
         name: (bare.harm + bare.repair)[bare.event == name] for name in problem.site.event_names
@@ -431,10 +431,11 @@ def _candidate(
     verified: bool,
     spent: Mapping[str, np.ndarray],
 ) -> ScoredLayout:
-    """Return a layout with what its releases say.
+    """Return a layout with the results of its releases.
 
     The sample of each event is extended by one release that deviates from the mean by the standard
-    deviation without barriers, because none of n releases does not mean never.
+    deviation without barriers, because an occurrence in none of n releases does not mean that its
+    probability is zero.
     """
     site, costs = problem.site, account(problem.site, layout, outcomes)
     value, variance = site.annual(layout), 0.0
@@ -496,8 +497,8 @@ def choose(
     """Return the best candidate that may be built, and its evaluation.
 
     Among those that meet the targets, it is the one with the lowest Z. A layout that was not
-    verified counts with the upper end of the 95 % interval of Z instead, so that none is chosen
-    because it has few releases and was lucky.
+    verified counts with the upper end of the 95 % interval of Z instead, so that no layout is
+    chosen only because its few releases happen to be favourable.
 
     If none meets the targets, the choice is among the verified layouts with barriers, or among all
     if there are none. It is the one that misses the targets least. If the probabilities of none of

@@ -91,7 +91,7 @@ def simulate(
 
 
 def _write_part(file: Path, outcomes: list[Outcome], found: Passages) -> None:
-    """Write some releases to disk, all or nothing."""
+    """Write some releases to disk atomically."""
     words = np.frombuffer(msgspec.msgpack.encode(outcomes), dtype=np.uint8)
     arrays = {name: getattr(found, name) for name in ("stations", "event", "table", "stops")}
     with atomic(file) as part, part.open("wb") as opened:

@@ -1,4 +1,4 @@
-"""Check of a site: what will be computed, as text, and releases that are tried."""
+"""Check of a site: a description of what will be computed, and trial releases."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 CUTS = 20
-"""Times that a jointed mass is cut to tell its blocks."""
+"""Number of times that a jointed mass is cut to describe its blocks."""
 
 TIMED_RELEASES = 3
 """Releases of each event that are timed."""
@@ -36,15 +36,15 @@ LONG = 2.0
 
 
 class Trial(NamedTuple):
-    """What releases of an event took."""
+    """Number of steps and processor time of trial releases of an event."""
 
     event: str
     steps: int
-    """Most time steps of a release."""
+    """Greatest number of time steps of a release."""
     seconds: float
-    """Processor time of one, mean [s]."""
+    """Mean processor time of a release [s]."""
     cut_off: bool
-    """Whether rock above the road still moved at the end of one."""
+    """Whether rock above the road still moved at the end of a release."""
 
 
 def facts(site: Site) -> list[str]:
@@ -204,7 +204,7 @@ def _areas(source: Source, seed: int) -> list[float]:
 
 
 def joint_scale(source: Source) -> float | None:
-    """Return the factor that `block_area` sets on the spacings of joints, None without it."""
+    """Return the factor by which `block_area` scales the spacings of joints, None without it."""
     if source.block_area is None or not source.joints:
         return None
     return math.sqrt(source.block_area / spaced_area(source.joints))
@@ -219,7 +219,7 @@ def _period(rate: float) -> str:
 
 
 def try_releases(site: Site, seed: int = 0) -> list[Trial]:
-    """Simulate a few releases of each event without barriers, and return what they took.
+    """Simulate a few releases of each event without barriers, and return their computing effort.
 
     Raises
     ------
@@ -244,7 +244,7 @@ def try_releases(site: Site, seed: int = 0) -> list[Trial]:
 
 
 def table(site: Site, trials: Sequence[Trial]) -> Table:
-    """Return the table of events: how often, how large, and what a release takes."""
+    """Return the table of events: rate, size, and computing effort of a release."""
     found = empty_table(("event", "1/year", "years", "blocks", "m3", "t", "steps", "ms"))
     for event, trial in zip(site.events, trials, strict=True):
         source = site.source(event.source)

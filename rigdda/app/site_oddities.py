@@ -43,7 +43,7 @@ SPARSE, DENSE = 2.0, 90.0
 """Basal areas beyond which a forest is doubted [m2/ha]; dense protection forest has about 50."""
 
 HIGH_UP = 15.0
-"""Height above which stems are not thought to take their energy [m]."""
+"""Height above which it is doubted that stems take their energy [m]."""
 
 HUGE = 20.0
 """Volume of a block above which an area may have been meant for one [m3]."""
@@ -58,7 +58,7 @@ SLOW_LOOSE_BLOCKS, SLOW_MASS_BLOCKS = 100, 1000
 """Numbers of loose blocks, and of blocks of a mass, from which on a release is slow."""
 
 LEAST_SHARE = 0.01
-"""Share of a band that is worth a word if blocks may stay where they are on it [-]."""
+"""Share of a band from which it is reported that blocks may stay where they are on it [-]."""
 
 FARTHER = 3.0
 """Length of the road over that of the slope on which events were counted, from which on it is
@@ -72,7 +72,7 @@ SIZE_LIMITS = {"height": "max_height", "depth": "max_depth", "width": "max_width
 """Limits of the zone for sizes of barriers."""
 
 DOUBTED_PRICE_FACTOR = 20.0
-"""Factor on a usual price, either way, beyond which its unit is doubted."""
+"""Factor above or below a usual price beyond which its unit is doubted."""
 
 NO_CHARGE = ("fence_base", "ditch_base", "removal", "clearing")
 """Prices that may well be 0."""
@@ -99,10 +99,10 @@ SHORT = 1.2 * LEAST_BEYOND
 """Length of the ground beyond the road that leaves a run-out little room [m]."""
 
 FALLING_DEG = 10.0
-"""Inclination of the last piece of the ground above which rock goes on beyond it [deg]."""
+"""Inclination of the last segment of the ground above which rock continues beyond it [deg]."""
 
 SCALED = 1.2
-"""Factor on the spacings of joints that is worth a word, either way."""
+"""Factor on the spacings of joints from which it is reported, as well as its inverse."""
 
 SLOW = 25.0
 """Speed below which a unit is doubted [km/h]."""
@@ -120,8 +120,8 @@ LEAST_FENCE_CLASS = 500
 def written_events(source: str) -> Written:
     """Return the table of each event by its name, as it is written in a file or a built-in site.
 
-    A site has the area and the rate that follow from a volume and a return period, and no longer
-    knows what was written. The result is empty for other names.
+    A site contains the area and the rate that follow from a volume and a return period, but not the
+    values that were written. The result is empty for other names.
     """
     if source in site_names.names():
         text = site_names.text(source)
@@ -145,8 +145,8 @@ def oddities(
     trials : sequence of Trial
         Releases that were tried.
     written : mapping
-        Tables of the events as they are written, see `written_events`. Values are then called what
-        they are called there.
+        Tables of the events as they are written, see `written_events`. Messages then give the keys
+        and values that are written there.
     """
     return [
         *_odd_profile(site),
@@ -165,7 +165,7 @@ def oddities(
         *_odd_design(site),
         *(
             f"motion.duration = {site.motion.duration:g} s: rock of {trial.event!r} still moves "
-            "above the road as releases end; use a longer duration"
+            "above the road when releases end; use a longer duration"
             for trial in trials
             if trial.cut_off
         ),
@@ -203,7 +203,7 @@ def _odd_profile(site: Site) -> Iterator[str]:
     if fall > FALLING_DEG:
         yield (
             f"slope.points: the ground falls by {fall:.0f} deg where it ends; survey it to where "
-            "rock stops if what lies below the road counts"
+            "rock stops if harm below the road matters"
         )
 
 
@@ -243,8 +243,8 @@ def _odd_zone(site: Site) -> Iterator[str]:
     longest = max(high - low for low, high in rooms)
     if longest < LEAST_ROOM:
         yield (
-            f"barrier_zone: {longest:.1f} m are free of loose rock; the best place will lie on an "
-            "end of it"
+            f"barrier_zone: only {longest:.1f} m are free of loose rock; the best place will lie on"
+            " an end of the zone"
         )
     room, needed = site.road.start - rooms[0][0], FENCE_CLASSES[LEAST_FENCE_CLASS].elongation
     if room < needed:
@@ -397,7 +397,7 @@ def _odd_traffic(site: Site, written: Written) -> Iterator[str]:
     if traffic.stopped_late > 1.0:
         yield (
             f"traffic: {traffic.stopped_late:.2g} vehicles run into the debris of each release; "
-            "the first of them warn those that follow; give run_into instead"
+            "the first of them would warn those that follow; give run_into instead"
         )
     if traffic.fatality_value is not None and traffic.fatality_value < CHEAP:
         yield (

@@ -117,7 +117,7 @@ def _draw_sources(axes: Axes, site: Site) -> None:
 
 
 def _draw_forest(axes: Axes, site: Site, tall: float) -> None:
-    """Draw a stem [m] at each of some even places of the forests; the places are no survey."""
+    """Draw stems [m] at evenly spaced places of the forests, which are not surveyed places."""
     length = float(np.ptp(np.array(site.slope.points)[:, 0]))
     for i, one in enumerate(site.forest):
         count = max(2, round(DRAWN_STEMS * (one.end - one.start) / length))
@@ -175,7 +175,7 @@ def _draw_places(axes: Axes, site: Site, lift: float) -> None:
 
 
 def _draw_survey(axes: Axes, site: Site) -> None:
-    """Add the coordinates of the survey on the upper and the right side, if they are others."""
+    """Add the coordinates of the survey on the upper and the right side, if they differ."""
     from matplotlib.ticker import FuncFormatter
 
     origin = site.origin

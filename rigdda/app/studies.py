@@ -1,4 +1,4 @@
-"""Studies: comparison of the layouts in a file on the same releases, with one CSV row a release."""
+"""Studies: comparison of the layouts of a file on common releases, with a CSV row per release."""
 
 from __future__ import annotations
 
@@ -245,7 +245,7 @@ def _fields(study: Study) -> list[str]:
 
 
 def _money(site: Site) -> tuple[str, ...]:
-    """Return the columns with costs and, if the site gives traffic, with those for it."""
+    """Return the columns with costs and, for a site with traffic, those with its risk."""
     return _MONEY if site.traffic is None else (*_MONEY, *_TRAFFIC_COLUMNS)
 
 
@@ -312,7 +312,7 @@ def _number(text: str) -> float:
 
 
 def releases(study: Study, path: Path) -> list[dict[str, Any]]:
-    """Return the rows of the complete CSV file of a study, one a release."""
+    """Return the rows of the complete CSV file of a study, one per release."""
     return _read(path, _fields(study))
 
 

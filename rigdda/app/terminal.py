@@ -134,7 +134,7 @@ def count_option(name: str, least: int, default: int, words: str) -> Callable[..
 checks_option = click.option(
     "--checks", type=click.Choice(("required", "reported")), default="required", show_default=True,
     help="Whether every barrier must meet the checks of its kind, such as energy and height of a "
-    "fence, or they are only reported.",
+    "fence, or the checks are only reported.",
 )  # fmt: skip
 
 
@@ -160,7 +160,7 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
 FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*]')
-"""Characters that some operating system does not allow in the name of a folder."""
+"""Characters that some operating systems do not allow in the name of a folder."""
 
 LONGEST_FOLDER_NAME = 200
 """Greatest length of the name of a folder [bytes]; operating systems allow 255."""
@@ -401,11 +401,11 @@ def progress(total: int) -> Iterator[Tick]:
 
 @contextmanager
 def interim(total: int) -> Iterator[tuple[Tick, Callable[[str, RenderableType], None]]]:
-    """Yield the function of `progress` and one that shows an answer which is to improve.
+    """Yield the function of `progress` and a function that shows an interim answer.
 
-    It takes the answer as one line and as a table. On a terminal the table stands above the
-    progress bar until the next one replaces it. Otherwise the line is written, the first one at
-    once and later ones at most every `PAUSE` seconds. Both are on standard error.
+    The second function takes the answer as one line and as a table. On a terminal, the table stands
+    above the progress bar until the next one replaces it. Otherwise, the line is written; the first
+    line appears at once, later ones at most every `PAUSE` seconds. Both are on standard error.
     """
     from rich.console import Group
     from rich.live import Live
@@ -436,9 +436,9 @@ def _lines(total: int) -> Tick:
 
 
 def _rarely(last: float) -> Callable[[str], None]:
-    """Return a function that writes at most one line every `PAUSE` seconds, the last at `last`.
+    """Return a function that writes at most one line every `PAUSE` seconds.
 
-    `last` is relative to now [s].
+    `last` is the assumed time of the line before, relative to now [s].
     """
     told = time.monotonic() + last
 

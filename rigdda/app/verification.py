@@ -135,7 +135,7 @@ class Verification:
 
 
 def is_clear(found: Difference, tolerance: float, comparisons: int) -> bool:
-    """Return whether one layout costs more than another, or at most `tolerance` more.
+    """Return whether it is clear that one layout costs more, or at most `tolerance` more.
 
     Parameters
     ----------

@@ -37,12 +37,12 @@ def with_frontier(
     """Return a result that misses a target with its verified frontier.
 
     If the layout was `searched` for, the best of all verified layouts takes its place in the result
-    and in the last of the cases. Its verification has other releases than this choice.
+    and in the last of the cases. It is verified on other releases than those of this choice.
 
     Returns
     -------
     result : DesignResult
-        The result, with what the verification says of the layouts that were tried.
+        The result, with the verified values of the layouts that were verified.
     frontier : tuple of TriedLayout
         The frontier.
     replaced : bool
@@ -75,8 +75,8 @@ def with_verified_frontier(
     """Return all layouts that were tried, with those of their frontier verified if possible.
 
     The layout of the frontier with the lowest P(reach) that is not verified is verified, and then
-    the frontier is determined again with its new probabilities, up to `MOST_VERIFIED` times. What
-    the verification says of a layout replaces what the search said.
+    the frontier is determined again with its new probabilities, up to `MOST_VERIFIED` times. The
+    results of the verification of a layout replace those of the search.
 
     Parameters
     ----------

@@ -35,8 +35,8 @@ ELEMENT = 5.0
 [m]."""
 
 THINNEST, LARGEST = 1e-3, 1e3
-"""Least and greatest length of a barrier [m]. Values beyond them are taken for typing errors, and
-thinner faces would be lost in rounding errors."""
+"""Least and greatest length of a barrier [m]. Values beyond them are regarded as typing errors, and
+rounding errors would dominate thinner faces."""
 
 Metres = Annotated[float, about(ge=THINNEST, le=LARGEST)]
 

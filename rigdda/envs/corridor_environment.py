@@ -1,6 +1,6 @@
 """Gymnasium environment `CorridorDesign`: the sections of a corridor one by one, with one budget.
 
-An agent that acts well has to know what money is worth in the sections to come.
+A good agent has to estimate the value of money in the remaining sections.
 """
 
 from __future__ import annotations
@@ -113,8 +113,8 @@ class CorridorDesign(LayoutEnv):
         After the last section. Truncated by a TimeLimit only.
     Info
         As in `BarrierDesign`, for the section that was designed (at reset, for the first one
-        without barriers), and `section` (name), `length` [m], `money` [EUR], what is left,
-        `metres` [m], what is left, `spent` [EUR], `gain` [EUR/year], both so far.
+        without barriers), and `section` (name), `length` [m], `money` [EUR] and `metres` [m] that
+        are left, and `spent` [EUR] and `gain` [EUR/year] so far.
     Randomness
         `reset` draws the sections and their order, their lengths, the budget, and the seeds of the
         releases.

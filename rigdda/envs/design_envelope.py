@@ -5,8 +5,8 @@ blocks were released. Quantiles of velocity and bounce height are taken at fixed
 smoothed along the slope by local linear regression with tricube weights (Cleveland 1979, Journal of
 the American Statistical Association 74, 829-836; Fan and Gijbels, Local Polynomial Modelling and
 Its Applications, Chapman and Hall 1996). A characteristic value is never below the quantile
-recorded at its station: the regression only raises what a station lacks by chance, and fills narrow
-dips, in which no fence can be placed exactly.
+recorded at its station: the regression only raises quantiles that are too low by chance, and fills
+narrow dips, in which no fence can be placed exactly.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ class Action(NamedTuple):
 
     @property
     def enough(self) -> bool:
-        """Whether so many blocks pass that the characteristic values are below the largest."""
+        """Whether enough blocks pass for the characteristic values to be below the largest ones."""
         return round(self.passing) * (1.0 - self.factors.quantile) >= 1.0 - 1e-9
 
     def energy(self) -> float:

@@ -1,4 +1,4 @@
-"""Table of forecasts: what each layout of a catalogue is expected to be worth on each site.
+"""Table of forecasts: the forecast Z of each layout of a catalogue on each site.
 
 `rigdda.agents.learning.forecasts` computes the rows with the value network, and the environment
 `rigdda/BarrierForecast-v0` reads them. A file of a table is in the safetensors format.
@@ -145,7 +145,7 @@ class ForecastTable:
         shape = len(names), len(layouts)
         fits = seen.shape == (shape[0], WIDTH) and features.shape[:2] == z.shape == shape
         if not fits or not shape[0] or not np.isfinite(z[:, 0]).all():
-            raise BadInput("table", str(path), f"this is no table of this version: {hint}")
+            raise BadInput("table", str(path), f"this is not a table of this version: {hint}")
         return cls(names, layouts, seen, features, z, notes)
 
 

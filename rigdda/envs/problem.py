@@ -44,12 +44,12 @@ class Targets:
     Parameters
     ----------
     reach : float, optional
-        That a block reaches the road.
+        Probability that a block reaches the road.
     failure : float, optional
-        That a barrier fails.
+        Probability that a barrier fails.
     individual : float, optional
-        That a commuter is killed within a year, see `rigdda.model.traffic`. The site must have a
-        table `[traffic]`.
+        Probability that a commuter is killed within a year, see `rigdda.model.traffic`. The site
+        must have a table `[traffic]`.
 
     Raises
     ------
@@ -117,9 +117,9 @@ def decide_mean(seen: Mean, greatest: float) -> str:
 
 
 def excess(value: float, greatest: float) -> float:
-    """Return by which share of itself a value exceeds the greatest acceptable one, 0 to 1 [-].
+    """Return the excess over the greatest acceptable value as a share of the value, 0 to 1 [-].
 
-    It compares an individual risk of the order of 1e-6 with probabilities.
+    With this measure, an individual risk of the order of 1e-6 can be compared with probabilities.
     """
     return max(1.0 - greatest / value, 0.0) if value > 0.0 else 0.0
 
@@ -268,7 +268,7 @@ any number of points."""
 
 
 def events_of_seeds(shares: Mapping[str, float], seeds: Sequence[int]) -> tuple[str, ...]:
-    """Return the event of each release; earlier ones do not depend on how many follow.
+    """Return the event of each release; it does not depend on the number of later releases.
 
     With at least two releases per event on average, each event first gets two releases, and the
     others are distributed so that the counts follow the shares. With fewer, the events are random

@@ -139,7 +139,7 @@ def quantiles(sample: BlockSample, levels: ArrayLike) -> list[Quantile]:
 
 
 def _effective(sample: BlockSample, value: float, level: float) -> int:
-    """Return the number of independent values that know a quantile as well as a sample does."""
+    """Return the number of independent values that determine a quantile as well as the sample."""
     n, releases = len(sample.values), len(np.unique(sample.release))
     weight = sample.weight
     if releases == n and np.ptp(weight) == 0.0:

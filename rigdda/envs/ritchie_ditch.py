@@ -1,7 +1,7 @@
 """Ritchie's ditch: width and depth that a ditch at the foot of a rock cut should have.
 
 Ritchie, Evaluation of rockfall and its control, Highway Research Record 17 (1963) 13-28, rolled
-rock down cuts and gives a chart by height and inclination of the cut. The FHWA took it over as a
+rock down cuts and gives a chart by height and inclination of the cut. The FHWA adopted it as a
 table (Brawner, Rockfall Hazard Mitigation Methods, FHWA SA-93-085, 1994). The figures here are that
 table, from memory; they could not be compared with the original. Pierson, Gullixson and Chassie
 (Rockfall Catchment Area Design Guide, FHWA-OR-RD-02-04, 2001) found that such ditches hold less

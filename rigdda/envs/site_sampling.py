@@ -190,7 +190,7 @@ def _named(
 
 
 class EpisodeSites:
-    """Sites on which an environment plays its episodes, and the slots that its actions fill.
+    """Sites of the episodes of an environment, and the slots that its actions fill.
 
     Parameters
     ----------

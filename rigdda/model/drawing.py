@@ -36,12 +36,12 @@ def polyline(path: Path, layer: str | None = None) -> tuple[Floats, tuple[str, .
 
     The vertices are (n, 2), or (n, 3) in space [m].
 
-    Arcs and splines are replaced by chords. A line in the plane x, z has its x and z returned.
+    Arcs and splines are replaced by chords. For a line in the plane x, z, its x and z are returned.
 
     Raises
     ------
     BadInput
-        If ezdxf is not installed, the file is no DXF drawing or is not in metres, or the drawing
+        If ezdxf is not installed, the file is not a DXF drawing or is not in metres, or the drawing
         has no polyline, or has several and `layer` does not name the layer of one.
     """
     unit, lines = _polylines(path)
@@ -57,7 +57,7 @@ def polyline(path: Path, layer: str | None = None) -> tuple[Floats, tuple[str, .
             raise BadInput("--layer", layer, hint)
     if len(lines) > 1:
         names = ", ".join(sorted(set(layers)))
-        hint = f"name the layer of the profile by --layer; there are polylines on {names}"
+        hint = f"name the layer of the profile with --layer; there are polylines on {names}"
         raise BadInput("--profile", f"{len(lines)} polylines", hint)
     if unit not in (0, 6):
         name = UNITS.get(unit, f"unit {unit}")

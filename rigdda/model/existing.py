@@ -1,7 +1,8 @@
 """Barriers that stand on a slope already.
 
 They are part of every layout of a site, also of the empty one, unless a layout removes or replaces
-them. Their capital is sunk: they cost upkeep only, and their repair after a failure.
+them. Their construction is already paid: they cost only their upkeep and, after a failure, their
+repair.
 """
 
 from __future__ import annotations
@@ -176,7 +177,7 @@ def check_existing(
     for i, one in enumerate(existing):
         where = f"existing[{i}]"
         if one.removal is not None and not one.removable:
-            hint = "leave it out, or say removable = true"
+            hint = "leave it out, or add removable = true"
             raise BadInput(f"{where}.removal", one.removal, hint)
         barrier = _barrier(one, where)
         if not low <= barrier.x <= high:
@@ -250,7 +251,7 @@ def replaced(
 ) -> dict[Barrier, float]:
     """Return the cost of removing what each barrier of a layout replaces [EUR/m].
 
-    What a removal in the layout removes is not among it.
+    It does not include the cost of the removals in the layout.
     """
     removed = {i for at, one in enumerate(layout) for i in _removed(existing, at, one)}
     out: dict[Barrier, float] = {}

@@ -8,10 +8,10 @@ those of the forest, weighted by w + d.
 
 A stem that a block strikes head on takes up to ``E = 38.7 r D**2.31`` joules from it, where D is
 the diameter at breast height in centimetres and r the fracture energy relative to silver fir
-(Dorren and Berger 2006, Tree Physiology 26, 63-71). Of an impact off the axis, it takes a share
-of this that falls from 0.98 to 0. This share and r are those of Rockyfor3D (Dorren 2016, Rockyfor3D
-(v5.2) revealed, ecorisQ). These figures are given as remembered; they could not be compared with
-the publications.
+(Dorren and Berger 2006, Tree Physiology 26, 63-71). Of an impact off the axis, it takes a share of
+this that falls from 0.98 to 0. This share and r are those of Rockyfor3D (Dorren 2016, Rockyfor3D
+(v5.2) revealed, ecorisQ). These figures are quoted from memory; they could not be compared with the
+publications.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ CONIFER, BROADLEAVED = 0.93, 1.59
 """Mean fracture energy of conifers and of broadleaved trees relative to silver fir [-]."""
 
 SHARE_LEAST, SHARE_RISE, SHARE_MIDDLE, SHARE_STEEPNESS = -0.046, 1.026, 0.58, 8.007
-"""Constants of the share of the energy that is taken off the axis, see `share` [-]."""
+"""Constants of the share of the energy that is taken in an impact off the axis, see `share` [-]."""
 
 HECTARE = 1e4
 """[m2]"""
@@ -108,7 +108,7 @@ class Forest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def most_energy(dbh: Floats, conifer: NDArray[np.bool_]) -> Floats:
-    """Return the energy that stems take of a central impact at most [J].
+    """Return the greatest energy that stems take in a central impact [J].
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def most_energy(dbh: Floats, conifer: NDArray[np.bool_]) -> Floats:
 
 
 def share(offset: Floats) -> Floats:
-    """Return the share of this energy that is taken of an impact off the axis of a stem [-].
+    """Return the share of this energy that is taken in an impact off the axis of a stem [-].
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def text(name: str) -> str:
 
 
 class Instance(NamedTuple):
-    """What the name of a generated site says.
+    """Content of the name of a generated site.
 
     Parameters
     ----------

@@ -266,9 +266,9 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rate_of: Annotated[
         str,
         about(
-            "What `rate` or `return_period` counts: releases of rock, or arrivals, which are "
-            "releases of which rock reaches the road without new barriers, as a log of rock on the "
-            "road counts them. The commands convert arrivals to releases.",
+            "What `rate` or `return_period` counts: all releases of rock, or arrivals, which are "
+            "releases in which rock reaches the road without new barriers. A log of rock on the "
+            "road counts arrivals. The commands convert arrivals to releases.",
             choices=(RELEASE, ARRIVAL),
         ),
     ] = RELEASE
@@ -340,7 +340,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 hint = "add how often it happens on 100 m of slope a year, or a return_period"
                 raise BadInput(f"{self.words}.rate", None, hint)
             if length is not None:
-                hint = "leave it out: it goes with a return_period, and the event gives a rate"
+                hint = "leave it out: it belongs to a return_period, and the event gives a rate"
                 raise BadInput(f"{self.words}.section_length", length, hint)
             return self.rate
         if self.rate is not _OPEN:
@@ -457,10 +457,11 @@ class Drawn(NamedTuple):
 
 @documented
 class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the survey has the point x = 0, y = 0 of the site.
+    """Position of the point x = 0, y = 0 of the site in the survey.
 
     Computation uses short coordinates that increase downhill. This table stores the offsets that
-    were subtracted from the survey coordinates, so that results can also be given in the latter.
+    were subtracted from the survey coordinates, so that results can also be given in survey
+    coordinates.
 
     Raises
     ------
@@ -666,9 +667,9 @@ class SiteTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
             "band releases its rock once a year on 100 m of slope."
         ),
     ] = ()
-    origin: Annotated[Origin, about("Where the survey has the point x = 0, y = 0 of the site.")] = (
-        Origin()
-    )
+    origin: Annotated[
+        Origin, about("Position of the point x = 0, y = 0 of the site in the survey.")
+    ] = Origin()
     road: Annotated[Road, about("The road.")]
     barrier_zone: Annotated[
         BarrierZone, about("Where barriers may stand, and how large they may be.")

@@ -165,7 +165,7 @@ def _check_chain(points: NDArray[np.float64]) -> None:
         return
     for k in range(2, len(points)):  # the first point whose piece meets an earlier one
         if not shapely.LineString(points[: k + 1]).is_simple:
-            hint = "correct it or the points before it: the ground crosses itself on the way there"
+            hint = "correct it or the points before it: the ground crosses itself before this point"
             raise BadInput(f"slope.points[{k}]", points[k].tolist(), hint)
 
 

@@ -81,7 +81,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         tuple[Point, ...],
         about(
             "Instead of a band, the corners [x, y] of a convex mass of rock. `joints` cut it into "
-            "blocks, at the spacings that they have or to the mean area `block_area`.",
+            "blocks, at their own spacings or to the mean area `block_area`.",
             "m",
         ),
     ] = ()
@@ -144,8 +144,8 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     shape: Annotated[
         str | None,
         about(
-            "Shape of the blocks of a band by name, in place of `corners` and `aspect`, of which "
-            "those that are given keep their values. `Site.save` writes these two.",
+            "Name of the shape of the blocks of a band. It sets those of the ranges `corners` and "
+            "`aspect` that are not given. `Site.save` writes these two ranges instead of it.",
             choices=SHAPES,
         ),
     ] = None

@@ -1,4 +1,4 @@
-"""Surveyed profiles: how they are read from files, and become the slope of a site."""
+"""Surveyed profiles: reading from files, and conversion to the slope of a site."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ LOCAL = 1000.0
 [m]."""
 
 ROUND = 100.0
-"""An offset is a whole multiple of this [m], so that it is easily added in the head."""
+"""An offset is a whole multiple of this [m], so that it is easily added by mental arithmetic."""
 
 LOWEST_GROUND, SUMMIT = -450.0, 9_000.0
 """Elevations [m] beyond which there is no ground on land."""
@@ -128,7 +128,7 @@ class Profile(NamedTuple):
     points: Floats
     """Corners (x, y) from the crest downhill, (n, 2) [m]."""
     origin: Origin
-    """Where the survey has x = 0 and y = 0."""
+    """Position of x = 0 and y = 0 in the survey."""
     notes: tuple[str, ...]
     """What was done to the survey, and what about it is doubtful, in sentences."""
 
@@ -434,7 +434,7 @@ def from_vertices(name: str, vertices: Floats) -> Survey:
     way = flat[-1] - start
     length = float(np.hypot(*way))
     if length < CLOSE:
-        hint = "let the profile run from the crest to beyond the road: its ends are in one place"
+        hint = "let the profile run from the crest to beyond the road: its ends are at one point"
         raise BadInput(name, flat[-1].tolist(), hint)
     along = (flat - start) @ way / length
     aside = float(np.abs((flat - start) @ [-way[1], way[0]] / length).max())
@@ -466,7 +466,7 @@ def profile_of(name: str, survey: Survey, road: tuple[float, float] | None = Non
     Raises
     ------
     BadInput
-        If the points are no profile from a crest to below a road, in metres.
+        If the points are not a profile in metres from a crest to below a road.
     """
     notes = list(survey.notes)
     _check_length(name, survey.points)

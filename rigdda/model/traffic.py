@@ -9,7 +9,7 @@ A vehicle meets rock in one of two ways (Bunce et al. 1997):
       E[vehicles hit] = lambda (L_v + w).
 
   For w = 0 this is the temporal and spatial probability P(S:T) = N_v / 24 * L_v / V of Bunce et al.
-  (1997), Hungr et al. (1999) and Fell et al. (2005). Nicolet et al. (2016) recommend to take the
+  (1997), Hungr et al. (1999) and Fell et al. (2005). Nicolet et al. (2016) recommend taking the
   width of the rock into account, too.
 
 - **A vehicle runs into debris that lies on the road.** Vehicles that are closer to the place than

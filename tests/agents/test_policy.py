@@ -154,7 +154,7 @@ def test_the_policy_that_ships_says_how_it_was_made() -> None:
     assert notes["command"].startswith("rigdda train") and notes["mechanics"] == MECHANICS
 
 
-SHAPE = "no policy of this version"
+SHAPE = "not a policy of this version"
 
 
 def test_a_network_of_another_shape_is_refused(tmp_path: Path) -> None:

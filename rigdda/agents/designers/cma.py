@@ -84,7 +84,7 @@ def _propose(problem: DesignProblem, first: list[Layout], rng: np.random.Generat
 
 
 def _centre(problem: DesignProblem, layout: Layout, rng: np.random.Generator) -> Floats:
-    """Return the vector of a layout, (size,), with empty slots that nearly hold a barrier.
+    """Return the vector of a layout, (size,), with empty slots just below the limit of presence.
 
     Their stations, sizes and kinds are drawn at random, so that every restart tries other ones.
     """

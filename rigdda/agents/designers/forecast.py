@@ -1,6 +1,6 @@
 """Forecasts of the remaining risk with any layout from releases without barriers.
 
-The ensemble of a designer (`rigdda.agents.designers.catalogue`) tells which blocks pass each
+The ensemble of a designer (`rigdda.agents.designers.catalogue`) shows which blocks pass each
 station, how fast and how high. A block that reaches the road without barriers counts as stopped if
 one of the barriers of a layout stops it on its path. This neglects the effect of a barrier on the
 motion farther downhill, blocks that lie against a barrier and rebounds from it. A small network
@@ -38,7 +38,7 @@ ENSEMBLE, HEAVY_ENSEMBLE, HEAVY = 40, 6, 30
 than `HEAVY` blocks, and this number of blocks. The value network is trained with them."""
 
 FEATURE_KINDS = ("fence", "ditch", "embankment", "gravity_wall", "mesh")
-"""Kinds of barrier that the features tell apart."""
+"""Kinds of barrier that the features distinguish."""
 
 QUANTILE = 0.95
 """Quantile of energies, heights and speeds at a barrier."""

@@ -132,7 +132,7 @@ def load(path: str | os.PathLike[str] = SHIPPED) -> Policy:
     except (ValueError, TypeError):
         layouts = ()
     if not sizes or sizes[0] != FEATURES or NOTHING not in layouts:
-        hint = "this is no policy of this version: name a file policy.safetensors that "
+        hint = "this is not a policy of this version: name a file policy.safetensors that "
         hint += "`rigdda train` wrote"
         raise BadInput("policy", str(path), hint)
     return Policy(Network(network.mean, network.scale, network.layers, notes), layouts)

@@ -1,7 +1,7 @@
 """The default designer: forecast all layouts, simulate the promising ones, race the best.
 
-Releases without barriers tell which blocks pass each station and how. From them, a network
-forecasts Z for every single barrier that may be built and for pairs of the best ones
+Releases without barriers show which blocks pass each station, how fast and how high. From them, a
+network forecasts Z for every single barrier that may be built and for pairs of the best ones
 (`rigdda.agents.designers.forecast`). The layouts with the least forecast minus one standard
 deviation are simulated in three batches. After each batch, a Gaussian process updates the forecasts
 of all layouts (`rigdda.agents.designers.surrogate`), and combinations of the best layout with

@@ -3,8 +3,8 @@
 The rule is that of `rigdda.envs.fence_checks`. Stations are compared by a price without the jumps
 between classes, and among prices that are nearly equal the station nearest the downhill end of the
 zone is taken, so that the answer hardly depends on the releases. If no fence fits, the answer is
-the ditch of Ritchie or else an embankment or a wall as high as the rule would have the fence, under
-its own name.
+Ritchie's ditch, or else an embankment or a wall with the height that the rule requires of a fence.
+It then has the name of this barrier.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class RuleAnswer:
     Parameters
     ----------
     layout : Layout
-        The fence; what stands instead if none fits; no barrier if none is needed or possible.
+        The fence; another barrier if no fence fits; no barrier if none is needed or possible.
     name : str
         "rule" for a fence that satisfies the rule, otherwise what the layout is.
     reason : str

@@ -152,9 +152,9 @@ class Store:
     them, so that an entry of another site, problem, seed or version of the mechanics is never
     returned. Evaluations from a store never contain outcomes.
 
-    The file holds JSON lines and is no database, because one process writes it, entries are only
-    appended, and all of them are read once at the start. A copy that was made at any moment is
-    therefore usable, and any tool can read it.
+    The file contains JSON lines. A database is not needed, because one process writes the file,
+    entries are only appended, and all of them are read once at the start. A copy that was made at
+    any moment is therefore usable, and any tool can read it.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
 """Gaussian process over layouts, with the forecast of a value network as its prior mean.
 
-Two layouts are alike if they have barriers of the same kind at nearby stations and of similar
-sizes. All layouts of a site are a little alike, since a forecast may be wrong for a whole site.
+Two layouts are strongly correlated if they have barriers of the same kind at nearby stations and of
+similar sizes. All layouts of a site are slightly correlated, because a forecast may be wrong for a
+whole site.
 """
 
 from __future__ import annotations
@@ -187,7 +188,7 @@ class Surrogate:
         Parameters
         ----------
         price : float
-            Additional annual cost per capital cost [1/year], as scarce money has it.
+            Additional annual cost per capital cost [1/year], which represents scarce money.
         """
         return self._hoped(self.deviation, 0.0, price)
 
@@ -329,7 +330,7 @@ class Surrogate:
 
 
 def _coordinates(barrier: Barrier, near: float) -> tuple[float, ...]:
-    """Return a number for the kind and scaled numbers that tell how alike two barriers are."""
+    """Return a number for the kind and scaled numbers whose distance gives the correlation."""
     kind = float(crc32(barrier.kind.encode()))
     if isinstance(barrier, Mesh):
         return kind, float(crc32(barrier.option.encode())), 0.0, 0.0, 0.0

@@ -52,8 +52,8 @@ def learn(
     tick : callable
         Called after every step.
     clone : bool
-        Whether the policy first imitates a softmax of the rewards. This begins with a policy that
-        knows good layouts on every site and prefers none of them too early.
+        Whether the policy first imitates a softmax of the rewards. The ascent then starts from a
+        policy that finds good layouts on every site and does not yet prefer a single one.
     """
     generator = torch.Generator().manual_seed(seed)
     optimiser = torch.optim.AdamW(policy.parameters(), lr=RATE, weight_decay=DECAY)

@@ -1,7 +1,8 @@
 """Simulated outcomes of promising layouts of a catalogue, with common random numbers.
 
-All layouts of a site are simulated on the same releases. A forecast that looks best is on average
-too good, and a policy that learns from forecasts alone repeats their errors. Outcomes correct both.
+All layouts of a site are simulated on the same releases. The forecast of the layout with the best
+forecast is on average too optimistic, and a policy that learns from forecasts alone repeats their
+errors. Outcomes correct both.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Relative layouts: types and relative places of barriers that mean something on every site.
+"""Relative layouts: types and relative places of barriers that can be applied to every site.
 
 A relative layout is a list of tables like those of a layout file. In place of the chainage `x`, a
 table has `station`, a fraction of the barrier zone from its uphill end. Mesh has `rank`, the number
@@ -84,7 +84,7 @@ def placed(menu: Menu, relative: str) -> Layout | None:
                 return None
             found.append(one)
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        hint = f"this is no relative layout of this version ({error}): train the policy again"
+        hint = f"this is not a relative layout of this version ({error}): train the policy again"
         raise BadInput("layouts", relative, hint) from None
     layout = tuple(sorted(found, key=lambda barrier: barrier.x))
     allowed = {*problem.kinds}.issuperset(barrier.kind for barrier in layout)

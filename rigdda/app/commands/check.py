@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @seed_option("Seed of the releases that are tried.")
 @out_option("check-SITE")
 def check(site: str, seed: int, out: Path | None) -> None:
-    """Draw SITE, say what will be computed and what looks odd.
+    """Draw SITE, describe what will be computed, and list values that look odd.
 
     SITE is the name of a built-in site or a TOML file. A few releases are simulated to estimate the
     time that others take. Writes site.png.

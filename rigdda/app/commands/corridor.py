@@ -51,8 +51,8 @@ def corridor(
 
     CORRIDOR is a TOML file or a built-in corridor (corridor-12, corridor-50). Every section is
     searched for layouts from the cheapest to the best, and an integer programme chooses one layout
-    for each section and budget. The choice is compared with the same money for every metre of road,
-    with the worst section first and with the greatest saving per cost.
+    for each section and budget. The choice is compared with three simple rules: equal money for
+    every metre of road, the worst section first, and the greatest saving per cost first.
 
     Writes budgets.csv, sections.csv, fronts.csv (all layouts), priorities.csv (what should be built
     next), the folder layouts, and pictures: gain.png (gain against budget) and strip.png (what is
@@ -79,16 +79,16 @@ def corridor(
         plan = Planner(problem, releases, seed, robust, stored, tick).plan()
         report.write(plan, folder)
     click.echo(
-        "Costs in thousand EUR, savings in thousand EUR per year. share: saving over that of\n"
-        "unlimited money; same, worst and ratio: the same share with equal money for every\n"
-        "metre, with the worst section first, and with the greatest saving per cost first;\n"
-        "1 EUR: what one more EUR would save each year."
+        "Costs are in thousand EUR, savings in thousand EUR per year. share: saving as a share\n"
+        "of the saving with unlimited money; same, worst and ratio: this share with equal money\n"
+        "for every metre, with the worst section first, and with the greatest saving per cost\n"
+        "first; 1 EUR: what one more EUR would save each year."
     )
     show(report.table_of_budgets(plan))
     own = report.shown_budget(plan)
     click.echo(
-        f"what a budget of {own.budget:,.0f} EUR builds; next: what comes first if there is more\n"
-        "money, see priorities.csv"
+        f"what a budget of {own.budget:,.0f} EUR builds; next: what would be built first with\n"
+        "more money, see priorities.csv"
     )
     show(report.table_of_sections(plan, own))
     for one in plan.plans[:-1]:

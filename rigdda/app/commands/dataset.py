@@ -46,8 +46,8 @@ def dataset(
 
     The layouts are no barrier, constants, single barriers of the catalogue, random layouts and
     neighbours of these. Writes for each site outcomes/SITE.parquet, with one row per release (site,
-    layout, event, seed and outcome), and sites/SITE.parquet, with what is known of the site. An
-    interrupted run continues with the next site, and a data set grows with --sites.
+    layout, event, seed and outcome), and sites/SITE.parquet, with data on the site. An
+    interrupted run continues with the next site. A larger --sites extends a data set.
     """
     from rigdda.app import dataset as job
 

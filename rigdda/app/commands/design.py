@@ -81,13 +81,13 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
 @click.option("--max-cost", type=RealNumber(min=0.0), metavar="EUR_PER_M",
               help="Largest capital cost of a layout in EUR per metre of road.")  # fmt: skip
 @click.option("--zone", type=RealNumber(), nargs=2, metavar="A B",
-              help="Place barriers between the chainages A and B [m], as in the site file, not of "
+              help="Place barriers between the chainages A and B [m] of the site file, not of "
               "its survey.  [default: the zone of the site]")  # fmt: skip
 @click.option("--precision", type=RealNumber(0.0, 0.5), default=PRECISION, show_default=True,
               metavar="P", help="Precision of the answer relative to Z. The verification ends when "
-              "the order of the layouts is clear or Z is known to within P, the search when "
-              "another 1,000 releases are expected to lower Z by less than P/2. 0 uses all "
-              "releases of --budget and --verify, as a target does.")  # fmt: skip
+              "the order of the layouts is clear or Z is known to within P; the search ends when "
+              "another 1,000 releases are expected to lower Z by less than P/2. With 0, or with a "
+              "target, all releases of --budget and --verify are used.")  # fmt: skip
 @count_option("--budget", 2, BUDGET, "Largest number of releases of the search.")
 @checks_option
 @count_option("--verify", 10, RELEASES, "Largest number of new releases for verifying each layout.")
@@ -116,7 +116,7 @@ def design(
     seed: int,
     out: Path | None,
 ) -> None:
-    """Find the best layout of barriers on SITE and verify it.
+    """Find the best layout of barriers for SITE and verify it.
 
     SITE is the name of a built-in site or a TOML file. The layout is verified on releases that the
     search did not use. The best layout has the least cost Z of those whose barriers meet their
@@ -133,7 +133,7 @@ def design(
 
     Writes layout.toml, evaluations.csv, section.png, cost.png and episode.rrd. The comparison on
     other grounds is in band.csv and band.png, the checks of the barriers are in checks.csv and
-    design_sheet.csv, and what the engineering rule demands along the slope is in demand.csv and
+    design_sheet.csv, and the demand of the engineering rule along the slope is in demand.csv and
     demand.png. For a site with traffic, risk.csv contains the risk to life. The outcomes of all
     releases are kept for `rigdda reprice`.
 
@@ -230,8 +230,8 @@ def _tell(done: DesignStudy, store: Store, folder: Path) -> None:
     chosen, result = done.chosen.evaluation, done.result
     click.echo(f"{findings.headline(findings.answer(done))}\n")
     click.echo(
-        "Z, capital, harm and repair in EUR per metre of road and year; to build in EUR per\n"
-        "metre; debris: rock on the road, relative to the first layout"
+        "Z, capital, harm and repair are in EUR per metre of road and year; to build is in EUR\n"
+        "per metre; debris: rock on the road, relative to the first layout"
     )
     show(tables.costs(done))
     chances = tables.chances(done)

@@ -38,10 +38,10 @@ if TYPE_CHECKING:
 @click.option("--spec", type=click.Path(path_type=Path), metavar="FILE",
               help="Specification of another exam.  [default: the one of the package]")  # fmt: skip
 @click.option("--sites", type=WholeNumber(1), metavar="N",
-              help="Play only the first N sites, and no corridor unless --corridors is "
+              help="Use only the first N sites, and no corridor unless --corridors is "
               "given.")  # fmt: skip
 @click.option("--corridors", type=WholeNumber(0), metavar="N",
-              help="Play only the first N corridors.")  # fmt: skip
+              help="Use only the first N corridors.")  # fmt: skip
 @click.option("--budget", "budgets", type=WholeNumber(0, limits.JOB_RELEASES), multiple=True,
               metavar="N", help="Releases per section. May be repeated.  [default: those of the "
               "specification]")  # fmt: skip
@@ -62,7 +62,7 @@ def exam(
     seed: int,
     out: Path | None,
 ) -> None:
-    """Score an optimiser or a policy on sites and corridors that no training uses.
+    """Score an optimiser or a policy on sites and corridors that are not used for training.
 
     The entry runs in a process of its own and simulates only through its task, which counts the
     releases. Its layouts are verified on releases whose seeds follow from the layouts. The score is

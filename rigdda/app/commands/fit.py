@@ -29,7 +29,7 @@ if TYPE_CHECKING:
                 required=True)  # fmt: skip
 @click.option("--parameters", "names", multiple=True, required=True, metavar="PATH[=LOW:HIGH]",
               help="Number of the site file to fit, such as surfaces.soil.restitution. May be "
-              "repeated; more than four are rarely identified.")  # fmt: skip
+              "repeated; more than two are rarely identified.")  # fmt: skip
 @click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
               show_default=True, help="Model that computes the run-outs.")  # fmt: skip
 @count_option("--budget", 8, 160, "Largest number of parameter sets to try.")

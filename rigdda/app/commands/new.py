@@ -54,8 +54,8 @@ def new(
     """Write a site file for the surveyed profile of a slope.
 
     All chainages are those of the survey. If the survey has the coordinates of a grid, an offset is
-    taken off and kept in the file. The comment on each value says whether it was surveyed or given,
-    or is a placeholder to replace.
+    subtracted and stored in the file. The comment on each value says whether it was surveyed or
+    given, or is a placeholder to replace.
     """
     from rigdda.app import new_site
 

@@ -20,8 +20,8 @@ def open_page(target: str | None, port: int | None, no_browser: bool) -> None:
 
     FILE is a site file. FOLDER is a folder with a site.toml, or an empty one into which a survey
     will be imported; the default is the current folder. A built-in SITE is copied to
-    runs/page-SITE. The page listens on this machine only, and its address holds a random token.
-    Needs the extra `page`.
+    runs/page-SITE. The page can be reached from this machine only, and its address contains a
+    random token. The command needs the extra `page`.
     """
     if any(importlib.util.find_spec(name) is None for name in ("panel", "bokeh", "tomlkit")):
         raise click.ClickException(f"the page needs the extra `page`: {INSTALL}")

@@ -23,14 +23,15 @@ if TYPE_CHECKING:
 @click.option("--pdf", is_flag=True, help="Print the report to report.pdf as well. Needs Chromium, "
               "Chrome or Edge.")  # fmt: skip
 @click.option("--serve", is_flag=True, help="Serve the report on this machine beside the replay "
-              "of RESULTS, which begins at the first impact. Ctrl-C ends it.")  # fmt: skip
+              "of RESULTS, which begins at the first impact. Ctrl-C ends the command.")  # fmt: skip
 def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) -> None:
-    """Write one report of results folders: report.html.
+    """Write one report, report.html, about results folders.
 
     RESULTS are folders that design, simulate, study, reprice, check, fit, sensitivity or corridor
-    wrote. The page needs no other file and no network, and it prints on A4: a summary, the site,
-    the assumptions with their sources, what comes down, the layouts compared, the limits of the
-    method, and the commands, seeds and versions to repeat the results.
+    wrote. The page needs no other file and no network, and it prints on A4. It contains a summary,
+    the site, the assumptions with their sources, the simulated rockfall, the comparison of layouts,
+    the limits of the method, and the commands, seeds and versions with which the results can be
+    repeated.
     """
     from rigdda.app import browser
     from rigdda.app.reports import html_blocks, html_report

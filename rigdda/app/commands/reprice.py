@@ -55,7 +55,8 @@ def reprice(
     on which the motion of rock depends are refused.
 
     Writes costs.csv, site.toml (the site with the new values), layout.toml (the best layout),
-    cost.png and, if a target is missed, frontier.csv and frontier.png; with traffic risk.csv.
+    cost.png and, if a target is missed, frontier.csv and frontier.png. For a site with traffic, it
+    also writes risk.csv.
     """
     from rigdda.app import reprice as job
     from rigdda.app.reports import design_report, findings, reprice_report, tables

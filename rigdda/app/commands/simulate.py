@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 )
 @count_option("--releases", 1, 100, "Number of releases.")
 @click.option("--station", "at", type=RealNumber(), multiple=True, metavar="X",
-              help="Chainage at which passing blocks are recorded [m], as in the site file, not "
-              "of its survey. May be repeated.  "
+              help="Chainage of the site file, not of its survey, at which passing blocks are "
+              "recorded [m]. May be repeated.  "
               "[default: the uphill edge of the road]")  # fmt: skip
 @click.option("--model", type=click.Choice(("blocks", "lumped")), default="blocks",
               show_default=True, help="Mechanical model. 'lumped' treats each block as a point; "
@@ -64,7 +64,7 @@ def simulate(
 
     Writes, each as CSV and Parquet: stations and along_slope (energies, velocity, bounce height and
     passing rate, with quantiles and intervals), passages (every passage at a station), run_out,
-    stopping and stops (where rock stops, also beyond the road). Writes pictures (section.png,
+    stopping and stops (where rock stops, also beyond the road). Also writes pictures (section.png,
     along_slope.png, run_out.png, and one for each station), outcomes.csv and run.npz (the first
     release). With --model lumped, writes points.csv only. A run that was interrupted continues
     where it stopped.
@@ -106,13 +106,13 @@ def simulate(
     for line, table in stations.tables(rows):
         click.echo(line)
         show(table)
-    click.echo("intervals: 95 %; ?: too few blocks for this end; height: of the centre of a block")
+    click.echo("95 % intervals; ?: too few blocks for this end; height: of the centre of a block")
     note(findings.of_layout(where, barriers, event))
     warn_of_placeholders(site)
     note(stations.undecided(passing))
     note(stations.lower_bound(rest))
     if passing.not_drawn:
         names = ", ".join(passing.not_drawn)
-        note(f"no release is of {names}: give --event to simulate one of them, or more releases")
+        note(f"no release of {names} was drawn: name one with --event, or give more --releases")
     resumed = f", {found.resumed:,} from an interrupted run" if found.resumed else ""
     click.echo(f"{releases:,} releases{resumed}; tables and pictures are in {folder}")

@@ -41,9 +41,9 @@ def study(file: str, seed: int, worst: int, out: Path | None) -> None:
     a `name` and either `barriers`, as in a layout file, or the name of a layout `file`.
 
     Writes study.csv (one row for each release), layouts.csv (Z and its parts), events.csv
-    (probabilities and energies), differences.csv (of each pair of layouts, on common releases),
-    sections.png, costs.png and, of a site with traffic, risk.csv; with --worst also worst.csv and
-    worst.png. An interrupted study continues from study.csv.
+    (probabilities and energies), differences.csv (the difference in Z of each pair of layouts, on
+    common releases), sections.png, costs.png and, for a site with traffic, risk.csv; with --worst
+    also worst.csv and worst.png. An interrupted study continues from study.csv.
     """
     from dataclasses import replace
 
@@ -65,8 +65,8 @@ def study(file: str, seed: int, worst: int, out: Path | None) -> None:
     click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
     show(study_report.costs(found))
     click.echo(
-        "probabilities with 95 % upper bounds in brackets; largest energies on the road and of a\n"
-        "hit: 95 % quantiles of the releases with one, in kJ per metre of width"
+        "probabilities with 95 % upper bounds in brackets; largest energy of a block on the road\n"
+        "and of a hit: 95 % quantile of the releases with one, in kJ per metre of width"
     )
     show(study_report.events(found))
     risks = study_report.risks(found)

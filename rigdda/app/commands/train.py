@@ -20,7 +20,7 @@ from rigdda.app.terminal import (
 )
 
 TRAINING_SITES = {"policy": 0, "value": 96, "corridor": 12}
-"""Default number of training sites by model; 0: those of the table that ships."""
+"""Default number of training sites by model; 0: those of the table of the package."""
 
 COMPARISON = "comparison.csv"
 """File with Z of the policy and of simple rules on each site."""
@@ -34,10 +34,10 @@ COMPARISON = "comparison.csv"
               help="Number of random sites to train on.  [default: the table of forecasts of the "
               "package for a policy, 96 for the value network, 12 for corridors]")  # fmt: skip
 @click.option("--algorithm", type=click.Choice(("gradient", "ppo")), default="gradient",
-              show_default=True, help="Exact policy gradient or PPO, for a policy.")  # fmt: skip
+              show_default=True, help="For a policy: exact policy gradient or PPO.")  # fmt: skip
 @click.option("--simulate", type=WholeNumber(0), default=0, show_default=True, metavar="K",
-              help="Number of promising layouts of each site to simulate for a second stage of "
-              "learning, for a policy.")  # fmt: skip
+              help="For a policy: number of promising layouts of each site to simulate for a "
+              "second stage of learning.")  # fmt: skip
 @click.option("--compare", type=WholeNumber(0), default=6, show_default=True, metavar="N",
               help="Number of validation sites for the comparison of a policy with simple "
               "rules.")  # fmt: skip
@@ -51,20 +51,22 @@ def train(
     """Train a network that designs layouts without a search.
 
     A policy chooses a layout from a catalogue of relative layouts. It learns on forecasts of the
-    value network, which takes seconds, and with --simulate also on outcomes. Then its layouts are
+    value network, which takes seconds, and with --simulate also on outcomes. Its layouts are then
     compared with no barrier, the constant, the rule and the best layout of the family of each site.
     Writes policy.safetensors, for `rigdda evaluate --policy`, and comparison.csv.
 
     The value network forecasts the remaining risk with any layout from the rockfall without
-    barriers. It is trained on simulated layouts of every site, about half a minute each. Writes
-    value.safetensors. The one that ships with the package is the prior of the designer `race`.
+    barriers. It is trained on simulated layouts of every site, which takes about half a minute for
+    each site. Writes value.safetensors. The value network of the package is the prior of the
+    designer `race`.
 
-    The agent for corridors needs to know how much money will save in the remaining sections. This
-    is computed from forecasts of the value network on every site, about half a minute each. Writes
-    prospect.safetensors.
+    The agent for corridors has to estimate how much money will save in the remaining sections. The
+    estimate is computed from forecasts of the value network on every site, which takes about half a
+    minute for each site. Writes prospect.safetensors.
 
-    An interrupted training continues where it stopped and gives the same result; the one of the
-    agent for corridors starts again. A policy and the value network require the extra `rl`.
+    An interrupted training continues where it stopped and gives the same result; the training of
+    the agent for corridors starts again. Training a policy or the value network requires the extra
+    `rl`.
     """
     number = sites or TRAINING_SITES[model]
     if model != "policy" and (simulate or algorithm != "gradient"):

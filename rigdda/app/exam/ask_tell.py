@@ -48,7 +48,7 @@ class AskTell:
 
     Examples
     --------
-    >>> from rigdda.agents import AskTell
+    >>> from rigdda.app.exam.ask_tell import AskTell
     >>> from rigdda.app.exam.counter import practice
     >>> search = AskTell(practice("narrow-1000000", budget=60))
     >>> rng = np.random.default_rng(0)

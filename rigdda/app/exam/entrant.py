@@ -82,10 +82,10 @@ class PipeLine:
 
 
 def refuse_simulations(line: PipeLine) -> None:
-    """Let the simulations of this package report and refuse their use in this process.
+    """Make the simulations of this package report and refuse their use in this process.
 
-    It is for accounting: an entry should not simulate releases that are not counted by mistake. It
-    does not stop an entry that means to.
+    This prevents an entry from simulating uncounted releases by mistake. It does not prevent an
+    entry from doing so on purpose.
     """
     for kind, method, name in (
         (Simulation, "__init__", "Simulation"), (SingleBlock, "run", "rigdda.release")

@@ -73,10 +73,10 @@ def interval(values: Floats, strata: Sequence[str], seed: int = 0) -> tuple[floa
 
 
 def ties(scores: Mapping[str, Floats]) -> dict[str, list[str]]:
-    """Return for each entry the others that it cannot be told apart from.
+    """Return for each entry the others from which it cannot be distinguished.
 
-    Two entries are told apart if the 95 % interval of the mean of their differences over the tasks
-    (Student's t) does not contain 0.
+    Two entries are distinguished if the 95 % interval of the mean of their differences over the
+    tasks (Student's t) does not contain 0.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """The scorer: it runs an entry in processes of its own and verifies what the entry submits.
 
-For each budget and seed a new process plays all sites and corridors, in the order of the budgets.
-When all layouts of a budget are fixed, the seeds of their verification follow from a hash of them.
-The layouts and the references are evaluated on the same releases.
+For each budget and seed, a new process works on all sites and corridors, in the order of the
+budgets. When all layouts of a budget are fixed, the seeds of their verification are computed from a
+hash of these layouts. The layouts and the references are evaluated on the same releases.
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ class Scorer:
         return self.verify()
 
     def play(self) -> None:
-        """Let the entry play all tasks that it has not played.
+        """Let the entry work on all tasks that are not done.
 
         Raises
         ------
@@ -214,7 +214,7 @@ class Scorer:
             fresh.write_bytes(msgspec.json.encode(list(self._done.values())))
 
     def _play(self, budget: int) -> None:
-        """Let the entry play all tasks with a budget that have not been played."""
+        """Let the entry work on all tasks with a budget that are not done."""
         orders = [o for o in self.asked.orders(budget) if (o.name, budget) not in self._done]
         if not orders:
             return

@@ -1,4 +1,4 @@
-"""The frozen specification of the exam, and the recorded references that scores are relative to."""
+"""The frozen specification of the exam, and the recorded references to which scores refer."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Specification(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Anchor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the score of a site or corridor is relative to.
+    """Recorded values of a site or corridor to which its score refers.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def references(
 
 
 class ExamPart(msgspec.Struct, frozen=True):
-    """The part of an exam that is played.
+    """The part of an exam that is run.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def part(
 ) -> ExamPart:
     """Return a part of an exam, by default all of it.
 
-    If only `sites` is given, no corridor is played.
+    If only `sites` is given, no corridor is used.
 
     Raises
     ------

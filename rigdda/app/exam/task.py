@@ -1,6 +1,6 @@
-"""What an entry of the exam works on: a site, or a corridor of several sections.
+"""Tasks of the exam on which an entry works: a site, or a corridor of several sections.
 
-The objects only ask. Releases are simulated and counted by the scorer, in another process.
+The objects only send requests. The scorer simulates and counts the releases in another process.
 """
 
 from __future__ import annotations

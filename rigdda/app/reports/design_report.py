@@ -54,7 +54,7 @@ from rigdda.seeds import release_seeds
 
 
 def interim_line(cases: Sequence[VerifiedLayout]) -> str:
-    """Return the layouts in one line: the name, Z and its interval, and what the last one is."""
+    """Return the layouts in one line: names, Z with intervals, and the barriers of the last one."""
     parts = []
     for case in cases:
         e = case.evaluation
@@ -254,7 +254,7 @@ def demand_rows(problem: DesignProblem, envelope: DesignEnvelope) -> Iterator[di
 
 
 def rule_words(answer: RuleAnswer) -> str:
-    """Return in words what the rule asks for, or what stands in its place and why."""
+    """Return in words what the rule requires, or which barrier replaces its fence and why."""
     caveat = f"; {answer.caveat}" if answer.caveat else ""
     if answer.name == rule.RULE_NAME and answer.check is not None:
         check = answer.check
@@ -283,7 +283,7 @@ def check_table(checks: LayoutChecks) -> Table:
 
 
 def _figure(value: float) -> str:
-    """Return a number with three figures, or in whole from 100."""
+    """Return a number with three figures, or as a whole number from 100 on."""
     if not math.isfinite(value):
         return "inf"
     return f"{value:,.0f}" if abs(value) >= 99.95 else f"{value:.3g}"

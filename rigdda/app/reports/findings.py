@@ -25,10 +25,10 @@ Money = tuple[float, float, float]
 
 
 REPORTED_REACH = 0.05
-"""Share of the releases of a design event that reach the road from which it is told [-]."""
+"""Share of the releases of a design event that reach the road from which it is reported [-]."""
 
 EXCESSIVE_USE = 1000.0
-"""Utilisation above which its value says no more; one without any capacity is infinite [-]."""
+"""Utilisation above which its value is not printed; without any capacity, it is infinite [-]."""
 
 
 class FailedCheck(NamedTuple):
@@ -143,7 +143,7 @@ def is_existing(failed: FailedCheck) -> bool:
 
 
 def _times(use: float) -> str:
-    """Return a utilisation with two decimals below 10, and in whole above."""
+    """Return a utilisation with two decimals below 10, and as a whole number above."""
     if use > EXCESSIVE_USE:
         return f"more than {EXCESSIVE_USE:,.0f}"
     return f"{use:.2f}" if use < 9.995 else f"{use:,.0f}"

@@ -364,7 +364,7 @@ def money(head: str, name: str) -> Column:
 
 
 def usual_columns(head: Sequence[str], rows: Sequence[Row]) -> tuple[Column, ...]:
-    """Return columns for a file about which nothing is known, intervals joined to their values."""
+    """Return columns for a file of unknown content, with intervals joined to their values."""
     ends = {f"{name}_{end}" for name in head for end in ("low", "high")
             if {f"{name}_low", f"{name}_high"} <= {*head}}  # fmt: skip
     return tuple(_usual(name, ends, rows) for name in head if name not in ends)

@@ -1,7 +1,8 @@
 """The report of results folders: one HTML page that needs no other file and no network.
 
-`EXHIBITS` of `report_contents` lists the tables and pictures of results folders that it shows,
-`SECTIONS` what is said besides them. What a site file states is in `site_description`.
+`EXHIBITS` of `report_contents` lists the tables and pictures of results folders that the report
+shows, and `SECTIONS` the functions that yield its other content. `site_description` describes the
+site file.
 """
 
 from __future__ import annotations
@@ -71,14 +72,14 @@ LONG_TABLES = {
     "posterior.csv": "samples of the fitted numbers",
     "fronts.csv": "all layouts of each section of a corridor",
 }
-"""Tables that are too long to show, and what they hold."""
+"""Tables that are too long to show, with their content."""
 
 Folders = Sequence[ResultsFolder]
 
 
 @dataclass(frozen=True, slots=True)
 class ReportSection:
-    """A section: its name in `EXHIBITS`, its title, and what it says besides the exhibits."""
+    """A section: its name in `EXHIBITS`, its title, and the function for its other content."""
 
     name: str
     title: str
@@ -87,12 +88,12 @@ class ReportSection:
 
 METHOD_LIMITS = (
     "The section is two-dimensional. Blocks do not leave its plane, and channels or ridges that "
-    "gather or spread rock along the road are not seen.",
+    "gather or spread rock along the road are not represented.",
     "A block is as long along the road as the root of its cross-section. Volumes, masses and "
-    "energies of whole blocks rest on this.",
+    "energies of whole blocks are based on this assumption.",
     "Blocks are rigid and do not break. A block that shatters loses energy, and its fragments may "
     "fly farther.",
-    "Trees, snow and water are neglected.",
+    "Snow and water are neglected, and so are trees, except those of a table [[forest]].",
     "The loss of energy at the ground is the least certain input. Where it was not fitted to "
     "observed run-outs, deposits or impacts, results may change by more than their intervals.",
     "Intervals describe the random variation of the releases only. They do not cover errors of the "
@@ -107,7 +108,7 @@ METHOD_LIMITS = (
 
 
 def _titled(blocks: list[Block], title: str, many: bool) -> list[Block]:
-    """Return blocks below a heading if there are several folders, and any blocks at all."""
+    """Return blocks, below a heading if there are several folders and the blocks are not empty."""
     return [Heading(title), *blocks] if many and blocks else blocks
 
 
@@ -135,7 +136,7 @@ def _show(exhibit: Exhibit, folder: ResultsFolder, mark: str) -> Iterator[Block]
 
 
 def summary_section(folders: Folders) -> Iterator[Block]:
-    """Yield the main result: what to build and what that saves, or which rock comes down."""
+    """Yield the main result: what to build and what it saves, or the simulated rockfall."""
     designs = [folder for folder in folders if folder.files("layouts.csv", "design")]
     for folder in designs:
         yield from _titled([*_design_blocks(folder)], f"Design in {folder.label}", len(designs) > 1)

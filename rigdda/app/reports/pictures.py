@@ -4,9 +4,9 @@ The section shows the trajectories of blocks, the barriers, and envelopes of the
 energies of the blocks. Further pictures show what passes along the slope and at a station, where
 blocks stop, and cost against risk.
 
-The picture of the rule answers where a fence of a given class would do: the demanded energy between
-the classes of the catalogue, the needed height between their greatest heights, and for each class
-the stretches where it satisfies the rule.
+The picture of the rule shows where a fence of a given class is sufficient: the demanded energy
+between the classes of the catalogue, the needed height between their greatest heights, and for each
+class the stretches where it satisfies the rule.
 """
 
 from __future__ import annotations
@@ -656,7 +656,7 @@ BINS = 30
 """Bins of a histogram."""
 
 HISTOGRAM_RATIO = 1e4
-"""Greatest energy over the least that is told apart in a histogram."""
+"""Greatest energy over the least that a histogram shows separately."""
 
 WHOLE, NORMAL = "#222222", "#b5651d"
 """Colours of all events together, and of heights normal to the slope."""

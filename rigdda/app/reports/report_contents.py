@@ -102,7 +102,7 @@ EXHIBITS = (
         "section.png",
         "Trajectories and envelopes",
         "Some trajectories of each event to scale, and the heights and energies that 95 % of the "
-        "passing blocks stay below, from all releases.",
+        "passing blocks do not exceed, from all releases.",
         command="simulate",
     ),
     Exhibit(
@@ -110,7 +110,7 @@ EXHIBITS = (
         "stations.csv",
         "What passes the stations",
         "Means, and quantiles with the ends of their 95 % intervals, from n passing blocks; “?” "
-        "where there are too few blocks for an end. Energies are those of a whole block. The "
+        "marks an end for which there are too few blocks. Energies are those of a whole block. The "
         "passing rate counts releases with at least one passing block.",
         (
             value("x [m]", "x_m", plain),
@@ -190,8 +190,8 @@ EXHIBITS = (
         ),
     ),
     Exhibit("layouts", "section.png", "The slope without and with the layout",
-            "Some trajectories of each event to scale. Below, the heights and energies that 95 % "
-            "of the passing blocks stay below without it.", command="design"),
+            "Some trajectories of each event to scale. Below them, the heights and energies that "
+            "95 % of the passing blocks do not exceed without the layout.", command="design"),
     Exhibit("layouts", "cost.png", "Cost and risk",
             "Annual capital cost of layouts against their remaining risk. Z is the same along the "
             "thin lines."),
@@ -216,8 +216,9 @@ EXHIBITS = (
         "events.csv",
         "Probabilities and energies by event",
         "Probability that a block of a release reaches the road and that a barrier fails, with "
-        "one-sided 95 % upper bounds; 95 % quantiles of the largest energies on the road and of a "
-        f"hit in kJ per metre of width; harm and repair of the event in {PER_YEAR}.",
+        "one-sided 95 % upper bounds; 95 % quantiles of the largest energy of a block on the road "
+        "and of the largest energy of a hit in kJ per metre of width; harm and repair of the event "
+        f"in {PER_YEAR}.",
         (
             words("event", "event"),
             words("layout", "layout"),
@@ -340,7 +341,7 @@ EXHIBITS = (
         "Cheapest layouts for each probability",
         "The cheapest layout that was evaluated for each probability that a block of a design "
         "event reaches the road, with one-sided 95 % upper bounds. To build: EUR per metre of "
-        f"road; Z in {PER_YEAR}, of layouts that were verified.",
+        f"road. Z is given in {PER_YEAR} for the layouts that were verified.",
         (
             Column("layout", ("barriers",), _barriers, number=False),
             money("to build", "cost"),
@@ -357,8 +358,8 @@ EXHIBITS = (
         "corridor",
         "budgets.csv",
         "What each budget achieves",
-        "Money spent and gain in EUR and EUR per year, with 95 % intervals; share of the gain of "
-        "unlimited money; saving of one more EUR per year.",
+        "Money spent in EUR and gain in EUR per year, with 95 % intervals; the gain as a share of "
+        "the gain with unlimited money; and what one more EUR would save each year.",
         (
             Column("budget", ("budget",), _budget, number=False),
             words("method", "method"),
@@ -389,5 +390,5 @@ EXHIBITS = (
     ),
     Exhibit("corridor", "priorities.csv", "What should be built next"),
 )  # fmt: skip
-"""What is shown of each results folder, in the order of the report. A new table or picture needs
-one entry here; tables without an entry are listed in the appendix."""
+"""Tables and pictures of results folders, in the order of the report. A new table or picture needs
+an entry here; tables without an entry are listed in the appendix."""

@@ -330,7 +330,7 @@ def _beyond(passing: Passing, group: str, grid: Floats) -> Iterator[dict[str, An
 
 
 DEPOSIT_SHARES = (0.5, 0.95)
-"""Shares of the rock for which the chainage is told within which it comes to rest."""
+"""Shares of the rock for which the chainage within which it comes to rest is given."""
 
 
 def stopping(passing: Passing) -> Rows:
@@ -413,7 +413,7 @@ def lower_bound(rows: Rows) -> str:
 
 
 def undecided(passing: Passing) -> str:
-    """Return in words how many blocks had not stopped at the end, nothing if none."""
+    """Return in words how many blocks had not stopped at the end; empty if all had stopped."""
     state, words = passing.found.stops["state"], []
     if left := int((state == HAS_LEFT).sum()):
         words.append(f"{left:,} left the profile at its end ({ends(passing.site)[1]:g} m)")

@@ -7,8 +7,9 @@ has independent blocks, see `independent_blocks`.
 
 The posterior is a bootstrap: for each of many samples of the observed values, drawn with
 replacement, the numbers with the best score are sought on a Gaussian process through the scores of
-all sets that were tried. Each sample also has new noise of the scores, which is as large as the
-process finds it. Without smoothing, a set that was lucky with its releases would win too often.
+all sets that were tried. New noise is added to the scores of each sample, with the standard
+deviation that the process estimates. Without smoothing, a set with favourable releases would be
+chosen too often.
 """
 
 from __future__ import annotations
@@ -131,7 +132,7 @@ def _values(site: Site, found: Passages, one: DataSet) -> Floats:
 
 
 def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
-    """Return how many independent blocks would tell as much as a deposit.
+    """Return the number of independent blocks with as much information as a deposit.
 
     Blocks of one release push one another and start together, and large blocks count more than
     small ones. The number follows from the variance between computed releases of the share of rock
@@ -161,7 +162,7 @@ def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
     per_release = alone / between if between > 0.0 else 0.0
     count = round(per_release * one.releases)
     if count < LEAST_VALUES:
-        hint = f"a deposit of {one.releases} of these releases tells as little as {count} blocks: "
+        hint = f"a deposit of {one.releases} releases has as little information as {count} blocks: "
         hint += "give the number of releases that made it in a column releases"
         raise BadInput(f"observed deposit of {one.event}", count, hint)
     return min(count, DEPOSIT_PIECES)

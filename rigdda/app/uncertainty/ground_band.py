@@ -3,7 +3,7 @@
 The ground is the least certain input of a design. Layouts that were designed for the values of the
 site are evaluated on sites whose surfaces have other rolling resistance, restitution and friction,
 within the ranges of the library of grounds or from the posterior of a fit. All sites and layouts
-have the same releases.
+are evaluated on the same releases.
 """
 
 from __future__ import annotations

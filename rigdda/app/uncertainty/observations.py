@@ -1,7 +1,8 @@
 """Observations of rockfall to which a site is fitted, read from CSV files.
 
-A file has one of three forms, which its columns tell apart: run-outs of single blocks, a deposit
-(the mass that lies in each interval of chainage), or quantities of blocks that pass a station.
+A file has one of three forms, which are distinguished by their columns: run-outs of single blocks,
+a deposit (the mass that lies in each interval of chainage), or quantities of blocks that pass a
+station.
 """
 
 from __future__ import annotations

@@ -47,7 +47,8 @@ wider than the plausible ranges, because observations decide."""
 FACTORS = {"rate": 3.0, "size": 2.0, "level": 1.4, "cost": 2.0}
 """Factor by which a number may be larger or smaller than assumed: the rate of an event, the volume
 of its blocks, the level of the prices of barriers, and a cost or duration of the consequences.
-Inventories of rockfall seldom tell rates better than within a factor of three; all are assumed."""
+Inventories of rockfall seldom give rates to better than a factor of three; all factors are
+assumed."""
 
 INTEREST = (0.01, 0.05)
 """Plausible real rates of interest of public works [1/year]."""

@@ -92,6 +92,10 @@ class RealNumber(_InRange, click.FloatRange):
     what = "a number"
 
 
+CHAINAGE = RealNumber(-1e6, 1e6)
+"""Option type for a chainage [m]."""
+
+
 def out_option(default: str) -> Callable[..., Any]:
     """Return the option --out; the default is a folder in runs/."""
     return click.option(

@@ -10,6 +10,7 @@ import click
 from rigdda.agents.designers import DEFAULT, DESIGNERS
 from rigdda.agents.limits import SEED
 from rigdda.app.terminal import (
+    CHAINAGE,
     RealNumber,
     WholeNumber,
     checks_option,
@@ -80,7 +81,7 @@ def _kinds(_: click.Context, __: click.Parameter, value: str | None) -> Kinds:
               "a table [traffic].")  # fmt: skip
 @click.option("--max-cost", type=RealNumber(min=0.0), metavar="EUR_PER_M",
               help="Largest capital cost of a layout in EUR per metre of road.")  # fmt: skip
-@click.option("--zone", type=RealNumber(), nargs=2, metavar="A B",
+@click.option("--zone", type=CHAINAGE, nargs=2, metavar="A B",
               help="Place barriers between the chainages A and B [m] of the site file, not of "
               "its survey.  [default: the zone of the site]")  # fmt: skip
 @click.option("--precision", type=RealNumber(0.0, 0.5), default=PRECISION, show_default=True,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from rigdda.app.terminal import (
-    RealNumber,
+    CHAINAGE,
     counted,
     note,
 )
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
               help="Surveyed profile: a CSV file with columns such as chainage and elevation, or a "
               "DXF drawing with a polyline (extra `dxf`).")  # fmt: skip
 @click.option("--layer", metavar="LAYER", help="Layer of the polyline in a DXF drawing.")
-@click.option("--road", type=RealNumber(), nargs=2, metavar="START END", help="Edges of the road.")
-@click.option("--toe", type=RealNumber(), metavar="X", help="Foot of the slope.")
+@click.option("--road", type=CHAINAGE, nargs=2, metavar="START END", help="Edges of the road.")
+@click.option("--toe", type=CHAINAGE, metavar="X", help="Foot of the slope.")
 @click.option(
-    "--zone", type=RealNumber(), nargs=2, metavar="START END", help="Where barriers may stand."
+    "--zone", type=CHAINAGE, nargs=2, metavar="START END", help="Where barriers may stand."
 )
 @click.option("--ground", "grounds", multiple=True, metavar="NAME:START-END",
               help="Stretch of a ground of the library, such as talus:12-30, or only its name for "

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from rigdda.app.terminal import (
-    RealNumber,
+    CHAINAGE,
     count_option,
     executor_option,
     folder_for,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     help="Simulate only this event.  [default: draw events by their rates]",
 )
 @count_option("--releases", 1, 100, "Number of releases.")
-@click.option("--station", "at", type=RealNumber(), multiple=True, metavar="X",
+@click.option("--station", "at", type=CHAINAGE, multiple=True, metavar="X",
               help="Chainage of the site file, not of its survey, at which passing blocks are "
               "recorded [m]. May be repeated.  "
               "[default: the uphill edge of the road]")  # fmt: skip

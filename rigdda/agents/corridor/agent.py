@@ -75,6 +75,7 @@ def offer(problem: DesignProblem) -> Offer:
     crossings = ensemble(site, forecast_seeds(site), menu.stations)
     forecast = Forecast(problem, crossings, value_network())
     pool = forecasts_of(forecast, menu, [constant(problem, menu)], single_barriers(menu))
+    pool.add((barrier,) for barrier in menu.smallest())
     layouts: list[Layout] = [()]
     costs, gains = [0.0], [0.0]
     capital, value = pool.capital - site.capital(()), pool.value()

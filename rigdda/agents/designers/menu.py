@@ -68,7 +68,7 @@ class Menu:
         sites share a budget, a wall of half the height may save more per cost.
         """
         sizes = []
-        for kind in (k for k in self.problem.kinds if k in KINDS):
+        for kind in (k for k in self.problem.kinds if k in KINDS and KINDS[k].lengths):
             for barrier in itertools.islice(KINDS[kind].catalogue(self.zone), 1):
                 small = barrier
                 for name, (least, _) in barrier.bounds(self.zone).items():

@@ -16,6 +16,7 @@ from rigdda.agents.designers.protocol import Entry
 from rigdda.agents.designers.racing import Arm, allocation, behind
 from rigdda.agents.designers.store import Release, Store
 from rigdda.barriers import KINDS
+from rigdda.barriers.base import MIN_HEIGHT
 from rigdda.envs import DesignProblem
 from rigdda.envs.problem import Targets
 
@@ -141,6 +142,21 @@ def test_all_on_the_menu_may_be_built(kind: str) -> None:
     assert len(set(some)) == len(some) <= 5
     near = list(menu.neighbours((some[0],), 1.0, 1))
     assert near and all(problem.fits(layout) and layout != (some[0],) for layout in near)
+
+
+@pytest.mark.parametrize("kind", ["embankment", "gravity_wall"])
+def test_the_smallest_barriers_cost_less_than_those_on_the_menu(kind: str) -> None:
+    problem = DesignProblem(SITE, kinds=(kind,))
+    menu = Menu(problem)
+    found = menu.smallest()
+    assert found and all(problem.fits((b,)) for b in found)
+    assert {b.height for b in found} == {MIN_HEIGHT}
+    most = max(problem.site.capital((b,)) for b in found)
+    assert most < min(problem.site.capital((b,)) for b in menu.singles(kind))
+
+
+def test_mesh_has_no_smallest_size() -> None:
+    assert Menu(DesignProblem("quick", kinds=("mesh",))).smallest() == []
 
 
 def test_an_arm_is_behind_by_its_paired_difference(valley: Valley) -> None:

@@ -1,7 +1,8 @@
 """Agent for the environment `rigdda/Corridor-v0` that builds each section without a search.
 
-On the section at hand, the value network forecasts the cost of every single barrier and of pairs
-from releases without barriers (`rigdda.agents.designers.forecast`). The agent builds the layout
+On the section at hand, the value network forecasts the cost of every single barrier, of pairs and
+of barriers that are smaller than those of the catalogue, from releases without barriers
+(`rigdda.agents.designers.forecast`). The agent builds the layout
 with the greatest forecast gain of the section and of the sections to come together. What the money
 that is left will gain in the sections to come follows from `Prospect`, which is learned from
 forecasts on training sites. This is one step of approximate dynamic programming.
@@ -75,6 +76,7 @@ def offer(problem: DesignProblem) -> Offer:
     crossings = ensemble(site, forecast_seeds(site), menu.stations)
     forecast = Forecast(problem, crossings, value_network())
     pool = forecasts_of(forecast, menu, [constant(problem, menu)], single_barriers(menu))
+    pool.add((barrier,) for barrier in menu.smallest())
     layouts: list[Layout] = [()]
     costs, gains = [0.0], [0.0]
     capital, value = pool.capital - site.capital(()), pool.value()

@@ -3,7 +3,8 @@
 A designer finds the layout with the least annual cost Z. If several sites share a budget, money is
 scarce and each site needs cheaper layouts as well: those with the least Z + price x capital for
 some price of capital [1/year]. The search explores as the designer `race` does, but for several
-prices in turn. The result is a list of layouts to be compared on other releases.
+prices in turn, and it also tries barriers that are smaller than those of the catalogue. The result
+is a list of layouts to be compared on other releases.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ def layouts(
     menu, track = Menu(problem), Track(ledger)
     known = unsearched(problem, menu)
     surrogate = forecast_pool(ledger, menu, known)
+    surrogate.add((barrier,) for barrier in menu.smallest())
     track.expect = surrogate.expect
     explore(track, surrogate, ledger.left, PRICES)
     found = dict.fromkeys([(), *known, *front(surrogate, MOST_LAYOUTS - 1 - len(known))])

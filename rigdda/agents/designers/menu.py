@@ -6,8 +6,9 @@ layout lies.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -58,8 +59,27 @@ class Menu:
             return [mesh for mesh in options if self.problem.fits((mesh,))]
         if kind == "removal":
             return [one for one in self.problem.site.removals if self.problem.fits((one,))]
+        return self._at_stations(KINDS[kind].catalogue(self.zone))
+
+    def smallest(self) -> list[Barrier]:
+        """Return barriers of all kinds of the least sizes of a design, at all stations.
+
+        They are smaller than those of the catalogue, which are meant for a single site. If several
+        sites share a budget, a wall of half the height may save more per cost.
+        """
+        sizes = []
+        for kind in (k for k in self.problem.kinds if k in KINDS and KINDS[k].lengths):
+            for barrier in itertools.islice(KINDS[kind].catalogue(self.zone), 1):
+                small = barrier
+                for name, (least, _) in barrier.bounds(self.zone).items():
+                    small = small.resized(name, least, self.zone)
+                sizes.append(small)
+        return self._at_stations(sizes)
+
+    def _at_stations(self, sizes: Iterable[Barrier]) -> list[Barrier]:
+        """Return barriers of given sizes at all stations where they may be built."""
         found = []
-        for barrier in KINDS[kind].catalogue(self.zone):
+        for barrier in sizes:
             places = [*self.stations, *self._ends(barrier)]
             put = (self.put(barrier, float(x)) for x in places)
             found += [b for b in put if b is not None]

@@ -2,10 +2,10 @@
 
 On the section at hand, the value network forecasts the cost of every single barrier, of pairs and
 of barriers that are smaller than those of the catalogue, from releases without barriers
-(`rigdda.agents.designers.forecast`). The agent builds the layout
-with the greatest forecast gain of the section and of the sections to come together. What the money
-that is left will gain in the sections to come follows from `Prospect`, which is learned from
-forecasts on training sites. This is one step of approximate dynamic programming.
+(`rigdda.agents.designers.forecast`). The agent builds the layout with the greatest forecast gain of
+the section and of the sections to come together. What the money that is left will gain in the
+sections to come follows from `Prospect`, which is learned from forecasts on training sites. This is
+one step of approximate dynamic programming.
 """
 
 from __future__ import annotations

@@ -14,11 +14,12 @@ import panel as pn
 from bokeh.models import HoverTool, PointDrawTool
 
 from rigdda import BadInput, Site
-from rigdda.app.page import edits
+from rigdda.app.page import edits, parts
 from rigdda.app.page.findings import Findings, Found
 from rigdda.app.page.forms import Bound, button, choice, heading, number, text
 from rigdda.app.page.handles import DIGITS, Handle, handles
-from rigdda.app.page.section import HandleSource, Section
+from rigdda.app.page.loading import IMPORTING
+from rigdda.app.page.section import HandleSource, Section, ground_colour
 from rigdda.app.page.theme import TALL
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import spikes
@@ -44,8 +45,8 @@ class SlopeTab:
         self._handles: list[Handle] = []
         self._bound: list[Bound | Words] = []
         self._structure: Any = None
-        self._places = HandleSource(self._dragged)
-        self._points = HandleSource(self._dragged_point)
+        self._places = HandleSource(self.section.plot, self._dragged)
+        self._points = HandleSource(self.section.plot, self._dragged_point)
         self._draw_handles()
         self._checks = Findings()
         page.workspace.workers.add(self._checks)
@@ -53,8 +54,9 @@ class SlopeTab:
         self._findings = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._forms = pn.Column(width=WIDE, scroll=True, styles=TALL)
         self._import = self._importer()
+        self._left = pn.Column(self._findings, sizing_mode="stretch_width")
         self.panel = pn.Row(
-            pn.Column(self.section.plot, self._findings, sizing_mode="stretch_width"),
+            self._left,
             self._forms,
             sizing_mode="stretch_width",
         )
@@ -63,11 +65,14 @@ class SlopeTab:
         """Show the site as it is now."""
         if not self.project.has_site:
             self._forms[:] = [self._import]
+            self._left[:], self._structure = [self._findings], None
             words = "There is no site yet: import a survey."
             self._findings.object = f"<p>{words}</p>"
             return
         site = self.project.site
         self.section.show(site)
+        if len(self._left) == 1:  # without a ground, the figure has no ranges
+            self._left[:] = [self.section.plot, self._findings]
         self._handles = handles(site)
         self._places.show(
             {
@@ -114,24 +119,19 @@ class SlopeTab:
             )
         )  # fmt: skip
 
-    def _dragged(self, new: Any) -> None:
+    def _dragged(self, place: int, x: float, _: float) -> None:
         """Move what a handle stands for."""
-        for one, x in zip(self._handles, new["x"], strict=False):
-            if abs(float(x) - one.x) > 10.0**-DIGITS / 2:
-                self._change(one.moved(float(x)), f"moved the {one.words}")
-                return
+        one = self._handles[place]
+        if abs(x - one.x) > 10.0**-DIGITS / 2:
+            self._change(one.moved(x), f"moved the {one.words}")
         self.show()
 
-    def _dragged_point(self, new: Any) -> None:
+    def _dragged_point(self, k: int, x: float, y: float) -> None:
         """Move a point of the survey."""
-        points = self.project.site.slope.points
-        for k, (x, y) in enumerate(zip(new["x"], new["y"], strict=False)):
-            place = [round(float(x), DIGITS), round(float(y), DIGITS)]
-            if max(abs(place[0] - points[k][0]), abs(place[1] - points[k][1])) > 10.0**-DIGITS:
-                self.page.act(
-                    partial(self.project.set_value, ("slope", "points", k), place, "moved a point")
-                )
-                return
+        place = [round(x, DIGITS), round(y, DIGITS)]
+        self.page.act(
+            partial(self.project.set_value, ("slope", "points", k), place, f"moved point {k + 1}")
+        )
         self.show()
 
     def _show_found(self, found: Found) -> None:
@@ -211,18 +211,49 @@ class SlopeTab:
     def _rock(self, site: Site) -> list[Any]:
         out: list[Any] = [heading("Where rock starts")]
         for i, source in enumerate(site.sources):
+            name = self._name(
+                "Name of the source",
+                partial(_value, self.project, ("sources", i, "name")),
+                partial(self._rename_source, i),
+            )
+            out.append(pn.Row(name, self._remover(partial(self._remove_source, i), source.name)))
             if source.band is None:
                 words = "a mass cut by joints, or surveyed blocks; edit it in the site file"
                 out.append(text(f"{source.name}: {words}"))
                 continue
-            out += [
-                text(source.name),
+            out.append(
                 pn.Row(
                     self._number("Upper end [metres]", ("sources", i, "band", 0)),
                     self._number("Lower end [metres]", ("sources", i, "band", 1)),
-                ),
-            ]
-        return out
+                )
+            )
+        return [*out, button("Add a source band", self._add_band)]
+
+    def _name(self, label: str, get: Callable[[], Any], write: Callable[[Any], None]) -> Any:
+        """Return an input for a name."""
+        found = Bound(pn.widgets.TextInput(label=label, width=230, margin=(2, 8)), get, write)
+        self._bound.append(found)
+        return found.widget
+
+    def _remover(self, do: Callable[[], object], what: str) -> Any:
+        """Return a button that removes something."""
+        return button("Remove", do, width=90, margin=(18, 8), description=f"Remove {what}")
+
+    def _edit(self, change: Callable[[str], str], words: str) -> None:
+        self.page.act(lambda: self.project.change_site(change, words))
+
+    def _add_band(self) -> None:
+        site = self.project.site
+        self._edit(lambda old: parts.with_band(old, site), "added a source band")
+
+    def _remove_source(self, i: int) -> None:
+        site = self.project.site
+        words = f"removed {site.sources[i].name} and its events"
+        self._edit(lambda old: parts.without_source(old, site, i), words)
+
+    def _rename_source(self, i: int, name: str) -> None:
+        site = self.project.site
+        self._edit(lambda old: parts.renamed_source(old, site, i, name), f"named a source {name}")
 
     def _places_of_road(self) -> list[Any]:
         return [
@@ -252,7 +283,55 @@ class SlopeTab:
             told = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
             self._bound += [bound, Words(told, partial(self._ground_words, name))]
             out += [bound.widget, told]
-        return out
+        return [*out, *self._stretches(site)]
+
+    def _stretches(self, site: Site) -> list[Any]:
+        """Return the inputs for the stretches of the grounds, and the form that lays another."""
+        words = f"{site.slope.surface}, except on these stretches:"
+        out: list[Any] = [text(f"The slope is {words}" if site.slope.surfaces else "")]
+        for i, stretch in enumerate(site.slope.surfaces):
+            path = (*parts.STRETCHES, i)
+            ends = [
+                self._number(f"{stretch.surface}, {words} [metres]", (*path, end), width=130)
+                for end, words in (("start", "from"), ("end", "to"))
+            ]
+            out.append(
+                pn.Row(
+                    *ends,
+                    self._remover(
+                        partial(self._remove_stretch, i), f"this stretch of {stretch.surface}"
+                    ),
+                )
+            )
+        ground = pn.widgets.Select(
+            label="Ground of a new stretch", width=330, margin=(2, 8),
+            options={name.replace("_", " "): name for name in GROUNDS},
+        )  # fmt: skip
+        ends = [
+            pn.widgets.FloatInput(label=f"{words} [metres]", value=None, width=130, margin=(2, 8))
+            for words in ("From", "To")
+        ]
+        lay = button(
+            "Add", lambda: self._add_stretch(ground.value, *(one.value for one in ends)),
+            width=90, margin=(18, 8), description="Lay this ground over the others there",
+        )  # fmt: skip
+        return [*out, ground, pn.Row(*ends, lay)]
+
+    def _add_stretch(self, ground: str, start: float | None, end: float | None) -> None:
+        site = self.project.site
+
+        def change(old: str) -> str:
+            if start is None or end is None:
+                hint = "enter the chainages where the stretch begins and where it ends"
+                raise BadInput("new stretch", None, hint)
+            return parts.with_stretch(old, site, ground, start, end)
+
+        self._edit(change, f"added a stretch of {ground.replace('_', ' ')}")
+
+    def _remove_stretch(self, i: int) -> None:
+        site = self.project.site
+        words = f"removed a stretch of {site.slope.surfaces[i].surface}"
+        self._edit(lambda old: parts.without_stretch(old, site, i), words)
 
     def _ground(self, name: str) -> str | None:
         found = self.project.site.surfaces[name].ground
@@ -268,13 +347,29 @@ class SlopeTab:
             f"rolling resistance {ground.rolling.low:g} to {ground.rolling.high:g}"
         )
         quiet = f"margin:0;color:{self.theme.quiet}"
-        return f"<p style='{quiet}'>{html.escape(ground.words)}: {spans}</p>"
+        used = list(dict.fromkeys(self.project.site.slope.chain()[1]))
+        colour = ground_colour(self.theme, used, name) if name in used else "none"
+        mark = f"display:inline-block;width:22px;height:11px;background:{colour}"
+        told = f"{html.escape(ground.words)}: {spans}"
+        return f"<p style='{quiet}'><span style='{mark}'></span> {told}</p>"
 
     def _events(self, site: Site) -> list[Any]:
         out: list[Any] = [heading("Events")]
         bands = {s.name for s in site.sources if s.band is not None}
+        sources = [source.name for source in site.sources]
         for i, event in enumerate(site.events):
-            out.append(text(f"{event.name}, from {event.source}"))
+            name = self._name(
+                "Name of the event",
+                partial(_value, self.project, ("events", i, "name")),
+                self._set(("events", i, "name"), "the name of an event"),
+            )
+            out.append(pn.Row(name, self._remover(partial(self._remove_event, i), event.name)))
+            source = choice(
+                "Rock from", sources, partial(_value, self.project, ("events", i, "source")),
+                self._set(("events", i, "source"), "the source of an event"), 230,
+            )  # fmt: skip
+            self._bound.append(source)
+            out.append(source.widget)
             period = number(
                 "Return period on 100 metres [years]",
                 partial(_period, self.project, i), partial(self._set_period, i), 1.0, 230,
@@ -289,7 +384,15 @@ class SlopeTab:
             out.append(pn.Row(period.widget, design.widget))
             if event.source in bands and event.area is not None:
                 out += self._sizes(i)
-        return out
+        return [*out, button("Add an event", self._add_event)]
+
+    def _add_event(self) -> None:
+        site = self.project.site
+        self._edit(lambda old: parts.with_event(old, site), "added an event")
+
+    def _remove_event(self, i: int) -> None:
+        words = f"removed {self.project.site.events[i].name}"
+        self._edit(lambda old: parts.without_event(old, i), words)
 
     def _sizes(self, i: int) -> list[Any]:
         """Return the inputs for the volumes of the blocks of an event, and their shapes."""
@@ -327,16 +430,13 @@ class SlopeTab:
         self._change(values, "set the volume of blocks")
 
     def _change(self, values: dict[Path_, Any], words: str) -> None:
-        def change(old: str) -> str:
-            return edits.with_values(old, values)
-
-        self.page.act(lambda: self.project.change_site(change, words))
+        self._edit(lambda old: edits.with_values(old, values), words)
 
     def _importer(self) -> Any:
         """Return the form that makes a site of a survey."""
         name = pn.widgets.TextInput(label="Name of the site", value="section", width=340)
         file = pn.widgets.FileInput(
-            label="Survey", accept=".csv,.txt,.tsv,.xyz,.dat,.dxf", width=340
+            label="Survey (CSV or DXF)", accept=".csv,.txt,.tsv,.xyz,.dat,.dxf", width=340
         )
         layer = pn.widgets.TextInput(label="Layer of a drawing, if it has several", width=340)
         road = [
@@ -345,23 +445,29 @@ class SlopeTab:
         ]
 
         def make() -> None:
-            self.page.act(
-                lambda: self._import_survey(
-                    name.value, file, layer.value or None, [r.value for r in road]
+            notes: list[str] = []
+            ends = [one.value for one in road]
+            if self.page.act(
+                lambda: notes.extend(
+                    self._import_survey(name.value, file, layer.value or None, ends)
                 )
-            )
+            ):
+                self.page.say("; ".join([f"The site is made of {file.filename}", *notes]))
 
         return pn.Column(
             text("A table (CSV) with chainage and elevation in metres, or a drawing (DXF) with a "
                  "polyline. What is left empty becomes a placeholder to replace."),
-            name, text("Survey (CSV or DXF)"), file, layer, pn.Row(*road),
+            name, file, layer, pn.Row(*road),
             button("Make the site", make, primary=True),
             width=WIDE - 40,
         )  # fmt: skip
 
-    def _import_survey(self, name: str, file: Any, layer: str | None, road: list[Any]) -> None:
-        """Make a site of the survey that was chosen, in the place of the present one."""
-        from rigdda.app import new_site
+    def _import_survey(
+        self, name: str, file: Any, layer: str | None, road: list[Any]
+    ) -> tuple[str, ...]:
+        """Make a site of the survey in the place of the present one, and return what to note."""
+        with IMPORTING:
+            from rigdda.app import new_site
 
         if not file.value:
             raise BadInput("survey", None, "choose a file first")
@@ -377,7 +483,7 @@ class SlopeTab:
                 own = str(bad.field).replace(str(copy), file.filename)
                 raise BadInput(own, bad.value, bad.hint) from None
         self.project.change_site(lambda _: made, f"imported {file.filename}")
-        self.page.say("; ".join(found.notes))
+        return tuple(found.notes)
 
 
 class Words:
@@ -399,6 +505,7 @@ def _structure(site: Site) -> Any:
         tuple((s.name, s.band is None) for s in site.sources),
         tuple((e.name, e.source, e.area is None) for e in site.events),
         tuple(dict.fromkeys(site.slope.chain()[1])),
+        (site.slope.surface, tuple(stretch.surface for stretch in site.slope.surfaces)),
         tuple((k, round(h, 3)) for k, h in spikes(points)),
     )
 

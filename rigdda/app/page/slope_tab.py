@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import html
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import panel as pn
@@ -19,6 +19,7 @@ from rigdda.app.page.findings import Findings, Found
 from rigdda.app.page.forms import Bound, button, choice, heading, number, text
 from rigdda.app.page.handles import DIGITS, Handle, handles
 from rigdda.app.page.loading import IMPORTING
+from rigdda.app.page.locking import soon
 from rigdda.app.page.section import HandleSource, Section, ground_colour
 from rigdda.app.page.theme import TALL
 from rigdda.ground.grounds import GROUNDS
@@ -29,10 +30,13 @@ if TYPE_CHECKING:
 
 Path_ = tuple[str | int, ...]
 
+Key = tuple[Any, ...]
+"""What a row of the forms depends on, other than values."""
+
 MOST = 40
 """Points of the survey up to which each of them can be dragged."""
 
-WIDE = 400
+WIDE = 430
 """Width of the forms [pixels]."""
 
 
@@ -43,8 +47,7 @@ class SlopeTab:
         self.page, self.project, self.theme = page, page.project, page.theme
         self.section = Section(self.theme, "Section of the slope", coordinates=True)
         self._handles: list[Handle] = []
-        self._bound: list[Bound | Words] = []
-        self._structure: Any = None
+        self._rows: dict[Key, Row] = {}
         self._places = HandleSource(self.section.plot, self._dragged)
         self._points = HandleSource(self.section.plot, self._dragged_point)
         self._draw_handles()
@@ -65,7 +68,7 @@ class SlopeTab:
         """Show the site as it is now."""
         if not self.project.has_site:
             self._forms[:] = [self._import]
-            self._left[:], self._structure = [self._findings], None
+            self._left[:], self._rows = [self._findings], {}
             words = "There is no site yet: import a survey."
             self._findings.object = f"<p>{words}</p>"
             return
@@ -83,12 +86,10 @@ class SlopeTab:
         )
         near = site.slope.points if len(site.slope.points) <= MOST else ()
         self._points.show({"x": [p[0] for p in near], "y": [p[1] for p in near]})
-        structure = _structure(site)
-        if structure != self._structure:
-            self._structure = structure
-            self._build(site)
-        for one in self._bound:
-            one.refresh()
+        self._build(site)
+        for row in self._rows.values():
+            for one in row.bound:
+                one.refresh()
 
     def tick(self) -> None:
         """Check a site that has changed, and show what was found."""
@@ -163,35 +164,65 @@ class SlopeTab:
         return found.widget
 
     def _build(self, site: Site) -> None:
-        """Build the forms anew, for a site with other tables than before."""
-        self._bound = []
-        self._forms[:] = [
-            *self._outliers(site),
-            *self._rock(site),
-            *self._places_of_road(),
-            *self._grounds(site),
-            *self._events(site),
-            pn.Card(self._import, title="Import a survey", collapsed=True, width=WIDE - 30),
-        ]
+        """Build the rows of the forms that the site needs and that are not there yet."""
+        before, self._rows = self._rows, {}
+        for key, build in self._needed(site):
+            if key in before:
+                self._rows[key] = before[key]
+                continue
+            self._bound: list[Bound | Words] = []
+            self._rows[key] = Row(build(), self._bound)
+        if list(self._rows) != list(before):
+            self._forms[:] = [one for row in self._rows.values() for one in row.panels]
 
-    def _outliers(self, site: Site) -> list[Any]:
-        """Return how the outliers of the survey are mended."""
-        found = spikes(np.array(site.slope.points, dtype=np.float64))
-        out: list[Any] = [heading("Doubtful points of the survey")] if found else []
-        for k, height in found:
-            x, y = site.slope.points[k]
-            words = (
-                f"Point {k + 1} at chainage {x:g}, elevation {y:g} metres, is {abs(height):.1f} "
-                f"metres {'above' if height > 0 else 'below'} both neighbours."
-            )
-            out += [
-                text(words),
-                pn.Row(
-                    button("Put it on the line", partial(self._put_on_line, k)),
-                    button("Remove the point", partial(self._remove_point, k)),
-                ),
-            ]
-        return out
+    def _needed(self, site: Site) -> Iterator[tuple[Key, Callable[[], list[Any]]]]:
+        """Yield the rows of the forms, each with what it depends on other than values."""
+        for k, height in spikes(np.array(site.slope.points, dtype=np.float64)):
+            yield ("outlier", k, round(height, 3)), partial(self._outlier, site, k, height)
+        yield ("rock",), lambda: [heading("Where rock starts")]
+        for i, source in enumerate(site.sources):
+            yield ("source", i, source.band is None), partial(self._source, i, source.band is None)
+        yield ("new band",), lambda: [button("Add a source band", self._add_band)]
+        yield ("road",), self._places_of_road
+        used = tuple(dict.fromkeys(site.slope.chain()[1]))
+        for name in used:
+            known = site.surfaces[name].ground in GROUNDS
+            yield ("ground", name, known), partial(self._ground_row, name, known)
+        surface = site.slope.surface
+        yield ("slope", surface), lambda: [text(f"The slope is {surface}, except on stretches:")]
+        for i, stretch in enumerate(site.slope.surfaces):
+            yield ("stretch", i, stretch.surface), partial(self._stretch, i, stretch.surface)
+        yield ("new stretch",), self._new_stretch
+        yield ("events",), lambda: [heading("Events")]
+        sources = tuple(source.name for source in site.sources)
+        for i, event in enumerate(site.events):
+            place = sources.index(event.source)
+            sized = site.sources[place].band is not None and event.area is not None
+            from_ = place if sized else None
+            yield ("event", i, sources, from_), partial(self._event, i, sources, from_)
+        yield ("new event",), lambda: [button("Add an event", self._add_event)]
+        yield (
+            ("import",),
+            lambda: [
+                pn.Card(self._import, title="Import a survey", collapsed=True, width=WIDE - 30)
+            ],
+        )
+
+    def _outlier(self, site: Site, k: int, height: float) -> list[Any]:
+        """Return how an outlier of the survey is mended."""
+        x, y = site.slope.points[k]
+        words = (
+            f"Point {k + 1} at chainage {x:g}, elevation {y:g} metres, is {abs(height):.1f} "
+            f"metres {'above' if height > 0 else 'below'} both neighbours."
+        )
+        return [
+            heading("A doubtful point of the survey"),
+            text(words),
+            pn.Row(
+                button("Put it on the line", partial(self._put_on_line, k)),
+                button("Remove the point", partial(self._remove_point, k)),
+            ),
+        ]
 
     def _put_on_line(self, k: int) -> None:
         (x0, y0), (x, _), (x1, y1) = self.project.site.slope.points[k - 1 : k + 2]
@@ -208,26 +239,19 @@ class SlopeTab:
             )
         )
 
-    def _rock(self, site: Site) -> list[Any]:
-        out: list[Any] = [heading("Where rock starts")]
-        for i, source in enumerate(site.sources):
-            name = self._name(
-                "Name of the source",
-                partial(_value, self.project, ("sources", i, "name")),
-                partial(self._rename_source, i),
-            )
-            out.append(pn.Row(name, self._remover(partial(self._remove_source, i), source.name)))
-            if source.band is None:
-                words = "a mass cut by joints, or surveyed blocks; edit it in the site file"
-                out.append(text(f"{source.name}: {words}"))
-                continue
-            out.append(
-                pn.Row(
-                    self._number("Upper end [metres]", ("sources", i, "band", 0)),
-                    self._number("Lower end [metres]", ("sources", i, "band", 1)),
-                )
-            )
-        return [*out, button("Add a source band", self._add_band)]
+    def _source(self, i: int, massive: bool) -> list[Any]:
+        """Return the inputs for a source of rock."""
+        get = partial(_value, self.project, ("sources", i, "name"))
+        name = self._name("Name of the source", get, partial(self._rename_source, i))
+        head = pn.Row(name, self._remover(partial(self._remove_source, i), "this source"))
+        if massive:
+            words = "A mass cut by joints, or surveyed blocks; edit it in the site file."
+            return [head, text(words)]
+        ends = [
+            self._number(f"{words} end [metres]", ("sources", i, "band", k))
+            for k, words in enumerate(("Upper", "Lower"))
+        ]
+        return [head, pn.Row(*ends)]
 
     def _name(self, label: str, get: Callable[[], Any], write: Callable[[Any], None]) -> Any:
         """Return an input for a name."""
@@ -237,7 +261,7 @@ class SlopeTab:
 
     def _remover(self, do: Callable[[], object], what: str) -> Any:
         """Return a button that removes something."""
-        return button("Remove", do, width=90, margin=(18, 8), description=f"Remove {what}")
+        return button("Remove", do, width=85, margin=(18, 8, 0, 8), description=f"Remove {what}")
 
     def _edit(self, change: Callable[[str], str], words: str) -> None:
         self.page.act(lambda: self.project.change_site(change, words))
@@ -268,54 +292,43 @@ class SlopeTab:
             ),
         ]
 
-    def _grounds(self, site: Site) -> list[Any]:
-        """Return the choice of the ground of each surface, and what it is."""
-        out: list[Any] = [heading("Grounds")]
-        options = {f"{name.replace('_', ' ')}": name for name in GROUNDS}
-        for name in dict.fromkeys(site.slope.chain()[1]):
-            path = ("surfaces", name, "ground")
-            known = (
-                options if site.surfaces[name].ground in GROUNDS else {"own values": None} | options
-            )
-            bound = choice(
-                f"Ground of {name}", known, partial(self._ground, name), self._set(path, name), 330
-            )
-            told = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
-            self._bound += [bound, Words(told, partial(self._ground_words, name))]
-            out += [bound.widget, told]
-        return [*out, *self._stretches(site)]
+    def _ground_row(self, name: str, known: bool) -> list[Any]:
+        """Return the choice of the ground of a surface, and what it is."""
+        path = ("surfaces", name, "ground")
+        library = {one.replace("_", " "): one for one in GROUNDS}
+        options = library if known else {"own values": None} | library
+        bound = choice(
+            f"Ground of {name}", options, partial(self._ground, name), self._set(path, name), 330
+        )
+        told = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
+        self._bound += [bound, Words(told, partial(self._ground_words, name))]
+        return [bound.widget, told]
 
-    def _stretches(self, site: Site) -> list[Any]:
-        """Return the inputs for the stretches of the grounds, and the form that lays another."""
-        words = f"{site.slope.surface}, except on these stretches:"
-        out: list[Any] = [text(f"The slope is {words}" if site.slope.surfaces else "")]
-        for i, stretch in enumerate(site.slope.surfaces):
-            path = (*parts.STRETCHES, i)
-            ends = [
-                self._number(f"{stretch.surface}, {words} [metres]", (*path, end), width=130)
-                for end, words in (("start", "from"), ("end", "to"))
-            ]
-            out.append(
-                pn.Row(
-                    *ends,
-                    self._remover(
-                        partial(self._remove_stretch, i), f"this stretch of {stretch.surface}"
-                    ),
-                )
-            )
+    def _stretch(self, i: int, surface: str) -> list[Any]:
+        """Return the inputs for a stretch of a ground."""
+        name = surface.replace("_", " ")
+        ends = [
+            self._number(f"{name} {words} [metres]", (*parts.STRETCHES, i, end), width=145)
+            for end, words in (("start", "from"), ("end", "to"))
+        ]
+        remove = self._remover(partial(self._remove_stretch, i), "this stretch")
+        return [pn.Row(*ends, remove)]
+
+    def _new_stretch(self) -> list[Any]:
+        """Return the form that lays another stretch."""
         ground = pn.widgets.Select(
             label="Ground of a new stretch", width=330, margin=(2, 8),
             options={name.replace("_", " "): name for name in GROUNDS},
         )  # fmt: skip
         ends = [
-            pn.widgets.FloatInput(label=f"{words} [metres]", value=None, width=130, margin=(2, 8))
+            pn.widgets.FloatInput(label=f"{words} [metres]", value=None, width=145, margin=(2, 8))
             for words in ("From", "To")
         ]
         lay = button(
             "Add", lambda: self._add_stretch(ground.value, *(one.value for one in ends)),
-            width=90, margin=(18, 8), description="Lay this ground over the others there",
+            width=85, margin=(18, 8, 0, 8), description="Lay this ground over the others there",
         )  # fmt: skip
-        return [*out, ground, pn.Row(*ends, lay)]
+        return [ground, pn.Row(*ends, lay)]
 
     def _add_stretch(self, ground: str, start: float | None, end: float | None) -> None:
         site = self.project.site
@@ -353,38 +366,32 @@ class SlopeTab:
         told = f"{html.escape(ground.words)}: {spans}"
         return f"<p style='{quiet}'><span style='{mark}'></span> {told}</p>"
 
-    def _events(self, site: Site) -> list[Any]:
-        out: list[Any] = [heading("Events")]
-        bands = {s.name for s in site.sources if s.band is not None}
-        sources = [source.name for source in site.sources]
-        for i, event in enumerate(site.events):
-            name = self._name(
-                "Name of the event",
-                partial(_value, self.project, ("events", i, "name")),
-                self._set(("events", i, "name"), "the name of an event"),
-            )
-            out.append(pn.Row(name, self._remover(partial(self._remove_event, i), event.name)))
-            source = choice(
-                "Rock from", sources, partial(_value, self.project, ("events", i, "source")),
-                self._set(("events", i, "source"), "the source of an event"), 230,
-            )  # fmt: skip
-            self._bound.append(source)
-            out.append(source.widget)
-            period = number(
-                "Return period on 100 metres [years]",
-                partial(_period, self.project, i), partial(self._set_period, i), 1.0, 230,
-                start=1e-3,
-            )  # fmt: skip
-            design = Bound(
-                pn.widgets.Checkbox(label="Design event", margin=(18, 8)),
-                partial(_design, self.project, i),
-                self._set(("events", i, "design"), "design event"),
-            )
-            self._bound += [period, design]
-            out.append(pn.Row(period.widget, design.widget))
-            if event.source in bands and event.area is not None:
-                out += self._sizes(i)
-        return [*out, button("Add an event", self._add_event)]
+    def _event(self, i: int, sources: tuple[str, ...], place: int | None) -> list[Any]:
+        """Return the inputs for an event; `place` is that of its band if it has sizes of blocks."""
+        get = partial(_value, self.project, ("events", i, "name"))
+        name = self._name(
+            "Name of the event", get, self._set(("events", i, "name"), "the name of an event")
+        )
+        source = choice(
+            "Rock from", list(sources), partial(_value, self.project, ("events", i, "source")),
+            self._set(("events", i, "source"), "the source of an event"), 230,
+        )  # fmt: skip
+        period = number(
+            "Return period on 100 metres [years]", partial(_period, self.project, i),
+            partial(self._set_period, i), 1.0, 230, start=1e-3,
+        )  # fmt: skip
+        design = Bound(
+            pn.widgets.Checkbox(label="Design event", margin=(18, 8)),
+            partial(_design, self.project, i),
+            self._set(("events", i, "design"), "design event"),
+        )
+        self._bound += [source, period, design]
+        rows = [
+            pn.Row(name, self._remover(partial(self._remove_event, i), "this event")),
+            source.widget,
+            pn.Row(period.widget, design.widget),
+        ]
+        return rows if place is None else rows + self._sizes(i, place)
 
     def _add_event(self) -> None:
         site = self.project.site
@@ -394,7 +401,7 @@ class SlopeTab:
         words = f"removed {self.project.site.events[i].name}"
         self._edit(lambda old: parts.without_event(old, i), words)
 
-    def _sizes(self, i: int) -> list[Any]:
+    def _sizes(self, i: int, place: int) -> list[Any]:
         """Return the inputs for the volumes of the blocks of an event, and their shapes."""
         volumes = [
             number(
@@ -404,10 +411,6 @@ class SlopeTab:
             for k, words in enumerate(("Least", "Greatest"))
         ]  # fmt: skip
         self._bound += volumes
-        place = next(
-            k for k, s in enumerate(self.project.site.sources)
-            if s.name == self.project.site.events[i].source
-        )  # fmt: skip
         shape = [
             self._number("Exponent of volumes [-]", ("events", i, "exponent"), step=0.1, width=150),
             self._number("Longest over broadest [-]", ("sources", place, "aspect", 1), step=0.1,
@@ -444,6 +447,10 @@ class SlopeTab:
             for w in ("one", "other")
         ]
 
+        def begin() -> None:
+            self.page.say("One moment: the survey is read.")
+            soon(make)
+
         def make() -> None:
             notes: list[str] = []
             ends = [one.value for one in road]
@@ -458,7 +465,7 @@ class SlopeTab:
             text("A table (CSV) with chainage and elevation in metres, or a drawing (DXF) with a "
                  "polyline. What is left empty becomes a placeholder to replace."),
             name, file, layer, pn.Row(*road),
-            button("Make the site", make, primary=True),
+            button("Make the site", begin, primary=True),
             width=WIDE - 40,
         )  # fmt: skip
 
@@ -486,6 +493,14 @@ class SlopeTab:
         return tuple(found.notes)
 
 
+class Row(NamedTuple):
+    """A row of the forms."""
+
+    panels: list[Any]
+    bound: list[Bound | Words]
+    """What follows the project."""
+
+
 class Words:
     """A text that follows the project."""
 
@@ -496,18 +511,6 @@ class Words:
     def refresh(self) -> None:
         """Show the text as it is now."""
         self.pane.object = self._get()
-
-
-def _structure(site: Site) -> Any:
-    """Return what the forms of a site depend on, other than values."""
-    points = np.array(site.slope.points, dtype=np.float64)
-    return (
-        tuple((s.name, s.band is None) for s in site.sources),
-        tuple((e.name, e.source, e.area is None) for e in site.events),
-        tuple(dict.fromkeys(site.slope.chain()[1])),
-        (site.slope.surface, tuple(stretch.surface for stretch in site.slope.surfaces)),
-        tuple((k, round(h, 3)) for k, h in spikes(points)),
-    )
 
 
 def _value(project: Any, path: Path_) -> Any:

@@ -5,8 +5,9 @@ Each function returns the text of a site file after the change. `Project.change_
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
-from itertools import count, pairwise
+from itertools import pairwise
 from typing import Any
 
 import msgspec
@@ -144,9 +145,9 @@ def _table(text: str, name: str, place: int) -> dict[str, Any]:
 
 
 def _free(name: str, taken: Iterable[str]) -> str:
-    """Return a name that is not taken: the name itself, or with a number."""
-    known, number, free = set(taken), 1, name
+    """Return a name that is not taken: the name itself, or with another number at its end."""
+    stem, known, number, free = re.sub(r" \d+$", "", name), set(taken), 1, name
     while free in known:
         number += 1
-        free = f"{name} {number}"
+        free = f"{stem} {number}"
     return free

@@ -15,7 +15,7 @@ from rigdda import BadInput, Layout
 from rigdda.agents.designers import DEFAULT, DESIGNERS
 from rigdda.app.page import placing
 from rigdda.app.page.barriers_tab import NAMES, alternatives_html, shown
-from rigdda.app.page.forms import Bound, button, heading, labelled, legend, paragraph, text
+from rigdda.app.page.forms import Bound, button, heading, in_words, legend, paragraph, text
 from rigdda.app.page.jobs import CANCELLED, FAILED, INTERRUPTED, RUNNING, Tried, tried
 from rigdda.app.page.known_layout import MOST_BARRIERS
 from rigdda.app.page.locking import on_change, watch
@@ -285,7 +285,7 @@ class DecideTab:
                 if isinstance(field.default, float) and field.default > 0.0:
                     path = (table, field.name)
                     widget = pn.widgets.EditableFloatSlider(
-                        label=labelled(field.text.rstrip("."), field.unit), start=0.0,
+                        label=in_words(field.name, field.unit), start=0.0,
                         end=3.0 * field.default, step=field.default / 100.0, width=WIDE - 60,
                         margin=(2, 8),
                     )  # fmt: skip
@@ -293,7 +293,7 @@ class DecideTab:
                         Bound(widget, partial(self._value, *path), partial(self._set, path),
                               "value_throttled")
                     )  # fmt: skip
-                    rows += [widget]
+                    rows += [text(f"{field.text.split('. ')[0].rstrip('.')}:"), widget]
         self._prices[:] = rows
 
     def _value(self, table: str, name: str) -> float:

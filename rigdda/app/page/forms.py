@@ -25,11 +25,6 @@ UNITS = {
 def in_words(name: str, unit: str) -> str:
     """Return the label of a value: its name in words and its unit in full."""
     words = name.replace("_", " ").removesuffix(" deg").removesuffix(" EUR").capitalize()
-    return labelled(words, unit)
-
-
-def labelled(words: str, unit: str) -> str:
-    """Return the label of a value: words and its unit in full."""
     unit = UNITS.get(unit, unit)
     return f"{words} [{unit}]" if unit else words
 

@@ -184,8 +184,8 @@ class SlopeTab:
             yield ("source", i, source.band is None), partial(self._source, i, source.band is None)
         yield ("new band",), lambda: [button("Add a source band", self._add_band)]
         yield ("road",), self._places_of_road
-        used = tuple(dict.fromkeys(site.slope.chain()[1]))
-        for name in used:
+        yield ("grounds",), lambda: [heading("Grounds")]
+        for name in dict.fromkeys(site.slope.chain()[1]):
             known = site.surfaces[name].ground in GROUNDS
             yield ("ground", name, known), partial(self._ground_row, name, known)
         surface = site.slope.surface

@@ -11,7 +11,7 @@ pn = pytest.importorskip("panel", reason="the extra page is not installed")
 
 from panel.io.state import set_curdoc  # noqa: E402
 
-from rigdda import sites  # noqa: E402
+from rigdda import BadInput, sites  # noqa: E402
 from rigdda.app import site_oddities  # noqa: E402
 from rigdda.app.page import ground, locking  # noqa: E402
 from rigdda.app.page.falls_tab import BATCH, FallsTab  # noqa: E402
@@ -143,3 +143,46 @@ def _wait(done, seconds=120.0):
     while not done():
         assert time.monotonic() < latest
         time.sleep(0.02)
+
+
+def test_forms_follow_what_is_added_and_removed_and_keep_the_other_rows(host):
+    from rigdda.app.page.slope_tab import SlopeTab
+
+    tab = SlopeTab(host)
+    tab.show()
+    before, events = dict(tab._rows), len(host.project.site.events)
+    tab._add_event()
+    tab.show()
+    (new,) = set(tab._rows) - set(before)
+    assert new[:2] == ("event", events)
+    assert all(tab._rows[key] is row for key, row in before.items())
+    tab._remove_event(events)
+    tab.show()
+    assert tab._rows == before
+    names = [row.bound[0].widget.value for key, row in tab._rows.items() if key[0] == "event"]
+    assert names == list(host.project.site.event_names)
+    with pytest.raises(BadInput, match="new stretch"):
+        tab._add_stretch("meadow", None, 12.0)
+
+
+def test_results_of_a_layout_are_computed_in_a_relative_folder(tmp_path, monkeypatch):
+    from rigdda.app.page.report_tab import ReportTab
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "project").mkdir()
+    (tmp_path / "project" / "site.toml").write_text(sites.text("quick"), encoding="utf-8")
+    with Workspace(Project.open("project")) as workspace:
+        workspace.study_file.write_text("", encoding="utf-8")
+        tab, begun = ReportTab(Host(workspace)), []
+        monkeypatch.setattr(tab.study, "start", begun.append)
+        tab._compute()
+    assert begun[0][:2] == ["study", str(workspace.study_file)]
+
+
+def test_new_barriers_have_round_sizes_and_chainages(host):
+    from rigdda.app.page import placing
+
+    for kind in ("fence", "ditch", "embankment"):
+        barrier = placing.new_barrier(host.project.site, (), kind)
+        for value in (barrier.x, *(getattr(barrier, one.field) for one in barrier.lengths)):
+            assert value == pytest.approx(round(value, 1))

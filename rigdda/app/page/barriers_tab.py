@@ -14,7 +14,7 @@ from bokeh.models import HoverTool, PointDrawTool
 from rigdda import Layout
 from rigdda.app.page import placing
 from rigdda.app.page.falls import Fall, Release
-from rigdda.app.page.forms import Bound, button, heading, in_words, number, paragraph, table
+from rigdda.app.page.forms import Bound, button, heading, in_words, legend, number, paragraph, table
 from rigdda.app.page.known_layout import LiveFigures
 from rigdda.app.page.placing import Grip
 from rigdda.app.page.section import HandleSource, Section
@@ -26,11 +26,17 @@ if TYPE_CHECKING:
     from rigdda.app.page.state import Project
     from rigdda.app.page.workspace import Host
 
+AROUND = 345
+"""Height of the window that is left for what stands above and below the section [pixels]."""
+
 DRAWN = 200
 """Number of releases whose paths are drawn."""
 
 WIDE = 470
 """Width of the column of figures [pixels]."""
+
+PATHS = (("stops before the road", SERIES[0]), ("reaches the road", SERIES[1]))
+"""Colours of the paths."""
 
 NAMES = {
     "fence": "Fence", "ditch": "Ditch", "embankment": "Embankment", "gravity_wall": "Gravity wall",
@@ -45,9 +51,9 @@ class BarriersTab:
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.live = page.workspace.live
-        self.section = Section(self.theme, "Section with barriers")
+        self.section = Section(self.theme, "Section with barriers", around=AROUND)
         self._grips: list[Grip] = []
-        self._handles = HandleSource(self._dragged)
+        self._handles = HandleSource(self.section.plot, self._dragged)
         self._draw_handles()
         self._release: Release | None = None
         self._drawn = 0
@@ -66,7 +72,8 @@ class BarriersTab:
         self._name = pn.widgets.TextInput(label="Name of an alternative", width=200)
         self.panel = pn.Row(
             pn.Column(
-                self._palette, self.section.plot, self._rules, self._forms, self._command,
+                self._palette, pn.pane.HTML(legend(PATHS), margin=(0, 8)), self.section.plot,
+                self._rules, self._forms, self._command,
                 sizing_mode="stretch_width",
             ),
             pn.Column(
@@ -136,16 +143,12 @@ class BarriersTab:
             }
         )
 
-    def _dragged(self, new: Any) -> None:
+    def _dragged(self, place: int, x: float, y: float) -> None:
         """Change the barrier whose handle was dragged."""
-        for grip, x, y in zip(self._grips, new["x"], new["y"], strict=False):
-            if max(abs(float(x) - grip.x), abs(float(y) - grip.y)) > 1e-9:
-                make = partial(
-                    placing.dragged, self.project.site, self.project.layout, grip, float(x),
-                    float(y),
-                )  # fmt: skip
-                self._change(make, f"dragged the {grip.words}")
-                break
+        grip = self._grips[place]
+        site, layout = self.project.site, self.project.layout
+        make = partial(placing.dragged, site, layout, grip, x, y)
+        self._change(make, f"dragged the {grip.words}")
         self._show_grips()
 
     def _change(self, make: Callable[[], Layout], words: str) -> None:

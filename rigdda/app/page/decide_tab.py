@@ -15,12 +15,12 @@ from rigdda import BadInput, Layout
 from rigdda.agents.designers import DEFAULT, DESIGNERS
 from rigdda.app.page import placing
 from rigdda.app.page.barriers_tab import NAMES, alternatives_html, shown
-from rigdda.app.page.forms import Bound, button, heading, in_words, paragraph, text
+from rigdda.app.page.forms import Bound, button, heading, in_words, legend, paragraph, text
 from rigdda.app.page.jobs import CANCELLED, FAILED, INTERRUPTED, RUNNING, Tried, tried
 from rigdda.app.page.known_layout import MOST_BARRIERS
 from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.section import plain_axes
-from rigdda.app.page.theme import SERIES, TALL, WRAPPED
+from rigdda.app.page.theme import SERIES, TALL, WRAPPED, growing
 from rigdda.envs import DesignProblem
 from rigdda.fields import described
 from rigdda.ground.prices import Consequences, Prices
@@ -40,6 +40,14 @@ TARGETS = {
 
 VERIFIED = "verification"
 """Stage of the evaluations on releases that the search did not use."""
+
+STAGES = (
+    ("verified, on releases that the search did not use", SERIES[1]),
+    ("unverified, of the search", SERIES[0]),
+)
+"""Colours of the layouts in the diagram."""
+
+COST = "Z, the sum of both axes [EUR per metre of road and year]"
 
 BEST = 8
 """Number of layouts in the table."""
@@ -94,6 +102,7 @@ class DecideTab:
         watch(self._only, self._show_found)
         self._points = ColumnDataSource({"x": [], "y": [], "colour": [], "words": [], "place": []})
         self._plot = self._diagram()
+        self._legend = pn.pane.HTML(legend(STAGES), margin=(6, 8))
         self._diagrams = pn.Column(sizing_mode="stretch_width")
         self._table = pn.Column(sizing_mode="stretch_width")
         self._revision = -1
@@ -144,7 +153,8 @@ class DecideTab:
 
     def _diagram(self) -> Any:
         plot = figure(
-            height=290, sizing_mode="stretch_width", tools="pan,wheel_zoom,box_zoom,reset",
+            height=290, sizing_mode="stretch_width", styles=growing(290, 430),
+            tools="pan,wheel_zoom,box_zoom,reset",
             title="Cost against risk; a click takes a layout",
             x_axis_label="capital and upkeep [EUR per metre of road and year]",
             y_axis_label="harm and repair [EUR per metre and year]",
@@ -229,7 +239,7 @@ class DecideTab:
         if self._only.value:
             found = [one for one in found[:60] if self._met(one.layout)]
         if bool(found) != bool(len(self._diagrams)):  # without points it has no ranges
-            self._diagrams[:] = [self._plot] if found else []
+            self._diagrams[:] = [self._legend, self._plot] if found else []
         self._listed = [one.layout for one in found]
         self._points.data = {
             "x": [one.capital for one in found],
@@ -238,7 +248,7 @@ class DecideTab:
             "words": [_words(one) for one in found],
             "place": list(range(len(found))),
         }
-        rows: list[Any] = [heading("The best layouts so far")] if found else []
+        rows: list[Any] = [heading(f"The best layouts so far, with {COST}")] if found else []
         for one in found[:BEST]:
             verified = "verified" if one.stage == VERIFIED else "unverified"
             ends = f"{shown(one.objective)} ({shown(one.low)} to {shown(one.high)})"
@@ -283,7 +293,7 @@ class DecideTab:
                         Bound(widget, partial(self._value, *path), partial(self._set, path),
                               "value_throttled")
                     )  # fmt: skip
-                    rows += [widget]
+                    rows += [text(f"{field.text.split('. ')[0].rstrip('.')}:"), widget]
         self._prices[:] = rows
 
     def _value(self, table: str, name: str) -> float:

@@ -70,6 +70,16 @@ def with_table(text: str, name: str, values: Mapping[str, Any]) -> str:
     return tomlkit.dumps(document)
 
 
+def with_rows(text: str, path: Path, rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the text of a TOML file with another list of tables, one in a line, at a path."""
+    found = tomlkit.array()
+    for row in rows:
+        table = tomlkit.inline_table()
+        table.update(row)
+        found.append(table)
+    return with_value(text, path, found.multiline(bool(rows)))
+
+
 def without(text: str, path: Path) -> str:
     """Return the text of a TOML file without a key, or without an item of a list.
 

@@ -16,7 +16,7 @@ from bokeh.plotting import figure
 from rigdda import Error
 from rigdda.app.page.barriers_tab import shown, ways
 from rigdda.app.page.falls import ENDS, Fall, Release, shares
-from rigdda.app.page.forms import button, heading, in_words, paragraph, table
+from rigdda.app.page.forms import button, heading, in_words, legend, paragraph, table
 from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.replays import replay_arguments
 from rigdda.app.page.section import BORDER, Section, plain_axes
@@ -107,7 +107,7 @@ class FallsTab:
 
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
-        self.section = Section(self.theme, "Releases; a click on a path replays it", 280)
+        self.section = Section(self.theme, "Releases; a click on a path replays it", 280, 440)
         self._release: Release | None = None
         self._passed: Passed | None = None
         self._shown: Any = None
@@ -137,11 +137,11 @@ class FallsTab:
         self._hits = ColumnDataSource({"x": [], "y": []})
         self._track = ColumnDataSource({"x": [], "energy": [], "height": []})
         self._time = pn.widgets.FloatSlider(
-            label="Time of the replay [seconds]", start=0.0, end=1.0, step=0.02, visible=False
+            label="Time of the replay [seconds]", start=0.0, end=1.0, step=0.02
         )
-        self._play = pn.widgets.Toggle(label="Play", width=80, visible=False, margin=(12, 8))
+        self._play = pn.widgets.Toggle(label="Play", width=80, margin=(12, 8))
         self._rerun = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
-        self._view = button("Open in rerun", self._open_viewer, visible=False, margin=(12, 8))
+        self._view = button("Open in rerun", self._open_viewer, margin=(12, 8))
         self._viewed = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._draw()
         for widget in (self._event, self._built):
@@ -150,15 +150,17 @@ class FallsTab:
         watch(self._station, self._moved)
         watch(self._what, self._show_collector)
         watch(self._time, self._show_block)
+        self._replaying = pn.Column(
+            heading("Replay"), pn.Row(self._time, self._play), self._rerun, self._view,
+            self._viewed, self._tracks, visible=False,
+        )  # fmt: skip
         self._put = pn.Row(self._event, self._built, self._by, self._go, self._stop, self._status)
         self.panel = pn.Row(
             pn.Column(self._put, self._legend, self.section.plot, self._envelopes, self._heights,
                       self._command,
                       sizing_mode="stretch_width"),
-            pn.Column(self._shares, heading("Collector"), pn.Row(self._station, self._what),
-                      self._histogram, self._collector, heading("Replay"),
-                      pn.Row(self._time, self._play), self._rerun, self._view, self._viewed,
-                      self._tracks,
+            pn.Column(self._replaying, self._shares, heading("Collector"),
+                      pn.Row(self._station, self._what), self._histogram, self._collector,
                       width=WIDE, scroll=True, styles=TALL),
             sizing_mode="stretch_width",
         )  # fmt: skip
@@ -194,7 +196,7 @@ class FallsTab:
                 self._shown = self._passed
                 self._show_collector()
                 self._show_envelopes()
-        if self._view.visible and self._viewed.object != (now := self._viewing_words()):
+        if self._replaying.visible and self._viewed.object != (now := self._viewing_words()):
             self._viewed.object = now
         if self._play.value and self._replayed is not None:
             later = self._time.value + 0.05
@@ -269,7 +271,7 @@ class FallsTab:
             plot.visible = False
         self._shares.object = self._collector.object = self._rerun.object = ""
         self._status.object = paragraph("Nothing is released yet.")
-        self._time.visible = self._play.visible = self._view.visible = False
+        self._replaying.visible = False
         self._viewed.object = ""
         self._command.object = ""
         if self.project.has_site:
@@ -380,12 +382,7 @@ class FallsTab:
                 (f"up to {top * (k + 1) / len(SCALE):.3g} {unit.get(name, '')}", colour)
                 for k, colour in enumerate(SCALE)
             ]
-        self._legend.object = " ".join(
-            f"<span style='white-space:nowrap;margin-right:14px'><span style='display:inline-block;"
-            f"width:22px;height:4px;background:{colour};vertical-align:middle'></span> "
-            f"{html.escape(words)}</span>"
-            for words, colour in items
-        )
+        self._legend.object = legend(items)
 
     def _show_shares(self) -> None:
         falls = self._release.falls if self._release else []
@@ -480,14 +477,13 @@ class FallsTab:
         self._tracks.visible = True
         self._time.end = fall.duration
         self._time.value = 0.0
-        self._time.visible = self._play.visible = True
         parts = ["rigdda", *self._replay_arguments(fall)]
         self._rerun.object = (
             f"{paragraph(f'{fall.event}, seed {fall.seed}: {fall.end}')}"
             f"<p style='margin:2px 0;color:{self.theme.quiet}'>To record it for rerun: "
             f"<code>{html.escape(shlex.join(parts))}</code></p>"
         )
-        self._view.visible = True
+        self._replaying.visible = True
         self._show_block()
 
     def _viewing_words(self) -> str:

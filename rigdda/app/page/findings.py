@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rigdda import Error, Site
+from rigdda.app.page.loading import IMPORTING
 
 
 class Found(NamedTuple):
@@ -59,7 +60,8 @@ class Findings:
 
     def _work(self, site: Site, file: Path) -> None:
         # imported by the thread: the page opens sooner
-        from rigdda.app import site_check, site_oddities
+        with IMPORTING:
+            from rigdda.app import site_check, site_oddities
 
         try:
             written = site_oddities.written_events(str(file))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -67,6 +67,16 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "")
         out += f"<tr style='{line}'>" + "".join(cell("td", v, k) for k, v in enumerate(row))
         out += "</tr>"
     return out + "</table>"
+
+
+def legend(items: Iterable[tuple[str, str]]) -> str:
+    """Return an HTML line that explains colours, each given with its words."""
+    return " ".join(
+        f"<span style='white-space:nowrap;margin-right:14px'><span style='display:inline-block;"
+        f"width:22px;height:4px;background:{colour};vertical-align:middle'></span> "
+        f"{html.escape(words)}</span>"
+        for words, colour in items
+    )
 
 
 class Bound:

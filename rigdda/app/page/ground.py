@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Error, Site, check
+from rigdda.app.page.loading import IMPORTING
 from rigdda.app.uncertainty import observations
 from rigdda.app.uncertainty.observations import DataSets
 from rigdda.app.uncertainty.parameters import Parameter
@@ -141,7 +142,8 @@ def compared(site: Site, sets: DataSets, releases: int) -> Compared:
     BadInput, Diverged
         As the fit does.
     """
-    from rigdda.app.uncertainty import fit  # heavy: imported by the thread
+    with IMPORTING:
+        from rigdda.app.uncertainty import fit  # heavy: imported by the thread
 
     seeds = range(releases)
     real = fit.observed_values(site, sets, seeds)
@@ -287,6 +289,7 @@ def fit_rows(folder: Path) -> list[Row]:
 
 def tried(folder: Path) -> int:
     """Return how many parameter sets a fit that is running has computed."""
-    from rigdda.app.simulate import PARTS
+    with IMPORTING:
+        from rigdda.app.simulate import PARTS
 
     return len(list((folder / PARTS).glob("*.npz")))

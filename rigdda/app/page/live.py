@@ -19,6 +19,7 @@ import msgspec
 import rigdda
 from rigdda import BadInput, Error, Layout, Site
 from rigdda.app.page.known_layout import LiveFigures, Outcomes
+from rigdda.app.page.loading import IMPORTING
 
 ROUNDS = (10, 25, 50, 100, 200, 400, 800, 1600)
 """Numbers of releases of each event after each round."""
@@ -46,7 +47,8 @@ class _Known:
     outcomes: dict[Layout, Outcomes] = field(default_factory=dict)
 
     def of(self, site: Site, layout: Layout) -> Outcomes:
-        from rigdda.envs.outcome_cache import release_key
+        with IMPORTING:
+            from rigdda.envs.outcome_cache import release_key
 
         key = release_key(site) + msgspec.json.encode(site.existing)
         if key != self.key:
@@ -165,7 +167,8 @@ class Live:
         self, site: Site, layout: Layout, others: Sequence[Layout], generation: int
     ) -> None:
         """Compute round after round until there is something else to do."""
-        from rigdda.app.page import figures
+        with IMPORTING:
+            from rigdda.app.page import figures
 
         broken = figures.broken_rules(site, layout)
         shown = LiveFigures(layout, 0, broken=broken, doing="starting")
@@ -197,7 +200,8 @@ class Live:
 
     def _compare(self, site: Site, others: Sequence[Layout], generation: int, count: int) -> None:
         """Compute the figures of other layouts, of so many releases of each event."""
-        from rigdda.app.page import figures
+        with IMPORTING:
+            from rigdda.app.page import figures
 
         for other in others:
             known = self.known(site, other)

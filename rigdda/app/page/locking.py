@@ -13,6 +13,9 @@ from typing import Any
 
 import panel as pn
 
+AFTER = 50
+"""Time after which what takes a while begins [ms]."""
+
 _held: list[Any] = []
 """The documents whose locks the callbacks that are running now hold, the innermost last. All
 callbacks run on the thread of the server, one after another."""
@@ -29,6 +32,18 @@ def locked(do: Callable[[], object]) -> None:
         do()
     else:
         document.add_next_tick_callback(partial(holding, do))
+
+
+def soon(do: Callable[[], object]) -> None:
+    """Do something that takes a while with the lock held, after the browser has shown the rest.
+
+    Without a server it is done at once.
+    """
+    document = pn.state.curdoc
+    if document is None or document.session_context is None:
+        do()
+    else:
+        document.add_timeout_callback(partial(holding, do), AFTER)
 
 
 def holding(do: Callable[[], object]) -> None:

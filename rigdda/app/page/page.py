@@ -13,6 +13,7 @@ from bokeh.models import Tooltip
 
 from rigdda import BadInput, Error
 from rigdda.app.page.forms import button, text
+from rigdda.app.page.loading import IMPORTING
 from rigdda.app.page.locking import holding, locked, watch
 from rigdda.app.page.state import Conflict
 from rigdda.app.page.theme import Theme, tab_css
@@ -30,13 +31,16 @@ TABS = ("Slope", "Falls", "Ground", "Barriers", "Decide", "Report")
 
 def tab_class(title: str) -> type[Tab]:
     """Return the class of a tab; its module is imported when it is first needed."""
-    module = importlib.import_module(f"rigdda.app.page.{title.lower()}_tab")
+    with IMPORTING:
+        module = importlib.import_module(f"rigdda.app.page.{title.lower()}_tab")
     found: type[Tab] = getattr(module, f"{title}Tab")
     return found
 
 
 def _import_tabs() -> None:
-    """Import the modules of all tabs."""
+    """Import the modules of all tabs, and what makes a site of a survey."""
+    with IMPORTING:
+        importlib.import_module("rigdda.app.new_site")
     for title in TABS:
         tab_class(title)
 
@@ -78,7 +82,7 @@ class Page:
             sizing_mode="stretch_width",
             stylesheets=[tab_css(theme)],
         )
-        watch(self._tabs, self._refresh, "active")
+        watch(self._tabs, self._turn, "active")
         other = "light" if theme.name == "dark" else "dark"
         link = pn.pane.HTML(
             f"<a href='?theme={other}' style='color:{theme.accent}'>{other} colours</a>",
@@ -156,6 +160,12 @@ class Page:
         """Begin with work in threads, which would delay the page before the browser shows it."""
         self._loaded = True
         threading.Thread(target=_import_tabs, name="tabs", daemon=True).start()
+
+    def _turn(self) -> None:
+        """Show the tab that was opened, without the message about what was done in another."""
+        if not self._keep.visible:
+            self._say("")
+        self._refresh()
 
     def _tick(self) -> None:
         if not self._loaded:

@@ -77,17 +77,26 @@ def new_barrier(site: Site, layout: Layout, kind: str) -> Barrier:
     raise BadInput(words, "no place", "no place in the zone allows one: move or remove another")
 
 
+def _rounded_sizes(barrier: Barrier) -> Barrier:
+    """Return a barrier whose lengths are whole multiples of `STEP`."""
+    for length in barrier.lengths:
+        value = getattr(barrier, length.field)
+        barrier = with_field(barrier, length.field, round(round(value / STEP) * STEP, 6))
+    return barrier
+
+
 def _rounded(place: FeasiblePlaces, barrier: Barrier) -> Barrier:
-    """Return a barrier at a round chainage if the rules allow it there."""
-    for x in (round(barrier.x, 1), round(barrier.x - STEP / 2, 1), round(barrier.x + STEP / 2, 1)):
-        there = place.put(barrier, x)
-        if there is None:
-            continue
-        try:
-            place.check("barrier", there)
-        except BadInput:
-            continue
-        return there
+    """Return a barrier of round sizes at a round chainage if the rules allow it there."""
+    for one in (_rounded_sizes(barrier), barrier):
+        for x in (round(one.x, 1), round(one.x - STEP / 2, 1), round(one.x + STEP / 2, 1)):
+            there = place.put(one, x)
+            if there is None:
+                continue
+            try:
+                place.check("barrier", there)
+            except BadInput:
+                continue
+            return there
     return barrier
 
 

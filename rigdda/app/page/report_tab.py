@@ -78,7 +78,7 @@ class ReportTab:
     def _compute(self) -> None:
         def start() -> None:
             workspace = self.page.workspace
-            if not (self.project.folder / workspace.study_file).is_file():
+            if not workspace.study_file.is_file():
                 raise BadInput("results", None, "wait until the tab Barriers shows figures")
             worst = ["--worst", str(WORST)] if self._worst.value else []
             self.study.start([*workspace.study_arguments, *worst])

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Sequence
 from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
+from bokeh.events import PanStart
 from bokeh.models import ColumnDataSource, HoverTool, Range1d
 from bokeh.plotting import figure
 
 from rigdda import BadInput, Layout, Site
 from rigdda.app.page.locking import on_change
-from rigdda.app.page.theme import Theme
+from rigdda.app.page.theme import Theme, growing
 from rigdda.app.reports.source_outlines import sources
 from rigdda.barriers import Earthwork, earthworks
 from rigdda.model.survey import spikes
@@ -26,7 +26,13 @@ BORDER = 62
 """Space left of an axis, so that figures below one another are aligned [pixels]."""
 
 HEIGHT = 400
-"""Height of the figure [pixels]."""
+"""Least height of the figure [pixels]."""
+
+AROUND = 320
+"""Height of the window that is left for what stands above and below the figure [pixels]."""
+
+MOVED = 1e-6
+"""Distance from which on a handle has been moved [m]."""
 
 
 def plain_axes(plot: Any, theme: Theme) -> None:
@@ -47,6 +53,11 @@ def plain_axes(plot: Any, theme: Theme) -> None:
         legend.border_line_color = None
 
 
+def ground_colour(theme: Theme, used: Sequence[str], name: str) -> str:
+    """Return the colour of a ground among those that a slope has, in their order."""
+    return theme.grounds[list(used).index(name) % len(theme.grounds)]
+
+
 class Section:
     """A figure of the slope.
 
@@ -57,7 +68,9 @@ class Section:
     name : str
         Title of the figure.
     height : int
-        Its height [pixels].
+        Its least height [pixels].
+    around : int
+        Height of the window that is left for what stands above and below it [pixels].
     coordinates : bool
         Whether it shows the coordinates and the inclination of the ground under the cursor.
 
@@ -67,10 +80,18 @@ class Section:
         The figure.
     """
 
-    def __init__(self, theme: Theme, name: str, height: int = HEIGHT, coordinates: bool = False):
+    def __init__(
+        self,
+        theme: Theme,
+        name: str,
+        height: int = HEIGHT,
+        around: int = AROUND,
+        coordinates: bool = False,
+    ):
         self.theme, self._coordinates = theme, coordinates
         self.plot = figure(
             height=height, sizing_mode="stretch_width", match_aspect=True,
+            styles=growing(height, around),
             tools="pan,wheel_zoom,box_zoom,reset", active_scroll="wheel_zoom", active_drag="pan",
             x_axis_label="chainage [metres]", y_axis_label="elevation [metres]",
             toolbar_location="right", name=name, min_border_left=BORDER,
@@ -153,7 +174,6 @@ class Section:
         low = min(y for _, y in points)
         bottom = low - 0.12 * (max(y for _, y in points) - low)
         used = list(dict.fromkeys(names))
-        colours = self.theme.grounds
         data: dict[str, list[Any]] = {"xs": [], "ys": [], "colour": [], "ground": []}
         k = 0
         for name, group in groupby(names):
@@ -162,7 +182,7 @@ class Section:
             k += count
             data["xs"].append([x for x, _ in piece] + [piece[-1][0], piece[0][0]])
             data["ys"].append([y for _, y in piece] + [bottom, bottom])
-            data["colour"].append(colours[used.index(name) % len(colours)])
+            data["colour"].append(ground_colour(self.theme, used, name))
             data["ground"].append(name)
         self._ground.data = data
         angle = [math.degrees(math.atan2(a[1] - b[1], b[0] - a[0])) for a, b in pairwise(points)]
@@ -212,15 +232,24 @@ def spanned(values: Sequence[float]) -> Range1d:
     return Range1d(low - margin, high + margin)
 
 
-GIVEN = 4
-"""Number of positions that the browser may still return although it was given others."""
+KEPT = 16
+"""Number of positions that were given to the browser and are remembered."""
 
 
 class HandleSource:
     """Positions of handles that a user drags, shown as glyphs of a plot.
 
-    The browser returns the positions of all handles after a drag. If it has not yet drawn what it
-    was given last, it returns what it was given before; this is told apart from a drag.
+    The browser returns the positions of all handles after each pan of the plot, whether it has
+    moved one or not, and perhaps before it has drawn what it was given last. The column `given`
+    says which positions its own are based on, so that only handles that it has moved count. If it
+    has moved several that lie on top of each other, the nearest to the beginning of the pan counts.
+
+    Parameters
+    ----------
+    plot : bokeh.plotting.figure
+        The plot.
+    dragged : callable
+        Function of the place of a handle that was dragged, and of its new coordinates.
 
     Attributes
     ----------
@@ -228,20 +257,39 @@ class HandleSource:
         The positions, with the columns x and y, and perhaps words.
     """
 
-    def __init__(self, dragged: Callable[[Any], None]):
-        self.source = ColumnDataSource({"x": [], "y": []})
+    def __init__(self, plot: Any, dragged: Callable[[int, float, float], None]):
+        self.source = ColumnDataSource({"x": [], "y": [], "given": []})
         self._dragged = dragged
-        self._given: deque[tuple[list[float], list[float]]] = deque(maxlen=GIVEN)
+        self._count = 0
+        self._given: dict[int, tuple[list[float], list[float]]] = {}
+        self._start: tuple[float, float] | None = None
         self._showing = False
+        plot.on_event(PanStart, self._begin)
         on_change(self.source, "data", self._changed)
 
     def show(self, data: dict[str, list[Any]]) -> None:
         """Show handles at other positions."""
-        self._given.append((list(data["x"]), list(data["y"])))
+        self._count += 1
+        self._given[self._count] = list(data["x"]), list(data["y"])
+        self._given.pop(self._count - KEPT, None)
         self._showing = True
-        self.source.data = data
+        self.source.data = data | {"given": [self._count] * len(data["x"])}
         self._showing = False
 
+    def _begin(self, event: Any) -> None:
+        self._start = (float(event.x), float(event.y))
+
     def _changed(self, new: Any) -> None:
-        if not self._showing and (list(new["x"]), list(new["y"])) not in self._given:
-            self._dragged(new)
+        if self._showing or not len(new["given"]):
+            return
+        known = self._given.get(int(new["given"][0]))
+        latest = self._given[self._count]
+        if known is None or not len(known[0]) == len(new["x"]) == len(latest[0]):
+            return
+        before = list(zip(*known, strict=True))
+        after = [(float(x), float(y)) for x, y in zip(new["x"], new["y"], strict=True)]
+        moved = [k for k, old in enumerate(before) if math.dist(old, after[k]) > MOVED]
+        if moved:
+            start = self._start or before[moved[0]]
+            k = min(moved, key=lambda k: math.dist(before[k], start))
+            self._dragged(k, *after[k])

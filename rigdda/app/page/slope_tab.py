@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import html
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import panel as pn
 from bokeh.models import HoverTool, PointDrawTool
 
 from rigdda import BadInput, Site
-from rigdda.app.page import edits
+from rigdda.app.page import edits, parts
 from rigdda.app.page.findings import Findings, Found
 from rigdda.app.page.forms import Bound, button, choice, heading, number, text
 from rigdda.app.page.handles import DIGITS, Handle, handles
-from rigdda.app.page.section import HandleSource, Section
+from rigdda.app.page.loading import IMPORTING
+from rigdda.app.page.locking import soon
+from rigdda.app.page.section import HandleSource, Section, ground_colour
 from rigdda.app.page.theme import TALL
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import spikes
@@ -28,10 +30,13 @@ if TYPE_CHECKING:
 
 Path_ = tuple[str | int, ...]
 
+Key = tuple[Any, ...]
+"""What a row of the forms depends on, other than values."""
+
 MOST = 40
 """Points of the survey up to which each of them can be dragged."""
 
-WIDE = 400
+WIDE = 430
 """Width of the forms [pixels]."""
 
 
@@ -42,10 +47,9 @@ class SlopeTab:
         self.page, self.project, self.theme = page, page.project, page.theme
         self.section = Section(self.theme, "Section of the slope", coordinates=True)
         self._handles: list[Handle] = []
-        self._bound: list[Bound | Words] = []
-        self._structure: Any = None
-        self._places = HandleSource(self._dragged)
-        self._points = HandleSource(self._dragged_point)
+        self._rows: dict[Key, Row] = {}
+        self._places = HandleSource(self.section.plot, self._dragged)
+        self._points = HandleSource(self.section.plot, self._dragged_point)
         self._draw_handles()
         self._checks = Findings()
         page.workspace.workers.add(self._checks)
@@ -53,8 +57,9 @@ class SlopeTab:
         self._findings = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._forms = pn.Column(width=WIDE, scroll=True, styles=TALL)
         self._import = self._importer()
+        self._left = pn.Column(self._findings, sizing_mode="stretch_width")
         self.panel = pn.Row(
-            pn.Column(self.section.plot, self._findings, sizing_mode="stretch_width"),
+            self._left,
             self._forms,
             sizing_mode="stretch_width",
         )
@@ -63,11 +68,14 @@ class SlopeTab:
         """Show the site as it is now."""
         if not self.project.has_site:
             self._forms[:] = [self._import]
+            self._left[:], self._rows = [self._findings], {}
             words = "There is no site yet: import a survey."
             self._findings.object = f"<p>{words}</p>"
             return
         site = self.project.site
         self.section.show(site)
+        if len(self._left) == 1:  # without a ground, the figure has no ranges
+            self._left[:] = [self.section.plot, self._findings]
         self._handles = handles(site)
         self._places.show(
             {
@@ -78,12 +86,10 @@ class SlopeTab:
         )
         near = site.slope.points if len(site.slope.points) <= MOST else ()
         self._points.show({"x": [p[0] for p in near], "y": [p[1] for p in near]})
-        structure = _structure(site)
-        if structure != self._structure:
-            self._structure = structure
-            self._build(site)
-        for one in self._bound:
-            one.refresh()
+        self._build(site)
+        for row in self._rows.values():
+            for one in row.bound:
+                one.refresh()
 
     def tick(self) -> None:
         """Check a site that has changed, and show what was found."""
@@ -114,24 +120,19 @@ class SlopeTab:
             )
         )  # fmt: skip
 
-    def _dragged(self, new: Any) -> None:
+    def _dragged(self, place: int, x: float, _: float) -> None:
         """Move what a handle stands for."""
-        for one, x in zip(self._handles, new["x"], strict=False):
-            if abs(float(x) - one.x) > 10.0**-DIGITS / 2:
-                self._change(one.moved(float(x)), f"moved the {one.words}")
-                return
+        one = self._handles[place]
+        if abs(x - one.x) > 10.0**-DIGITS / 2:
+            self._change(one.moved(x), f"moved the {one.words}")
         self.show()
 
-    def _dragged_point(self, new: Any) -> None:
+    def _dragged_point(self, k: int, x: float, y: float) -> None:
         """Move a point of the survey."""
-        points = self.project.site.slope.points
-        for k, (x, y) in enumerate(zip(new["x"], new["y"], strict=False)):
-            place = [round(float(x), DIGITS), round(float(y), DIGITS)]
-            if max(abs(place[0] - points[k][0]), abs(place[1] - points[k][1])) > 10.0**-DIGITS:
-                self.page.act(
-                    partial(self.project.set_value, ("slope", "points", k), place, "moved a point")
-                )
-                return
+        place = [round(x, DIGITS), round(y, DIGITS)]
+        self.page.act(
+            partial(self.project.set_value, ("slope", "points", k), place, f"moved point {k + 1}")
+        )
         self.show()
 
     def _show_found(self, found: Found) -> None:
@@ -163,35 +164,65 @@ class SlopeTab:
         return found.widget
 
     def _build(self, site: Site) -> None:
-        """Build the forms anew, for a site with other tables than before."""
-        self._bound = []
-        self._forms[:] = [
-            *self._outliers(site),
-            *self._rock(site),
-            *self._places_of_road(),
-            *self._grounds(site),
-            *self._events(site),
-            pn.Card(self._import, title="Import a survey", collapsed=True, width=WIDE - 30),
-        ]
+        """Build the rows of the forms that the site needs and that are not there yet."""
+        before, self._rows = self._rows, {}
+        for key, build in self._needed(site):
+            if key in before:
+                self._rows[key] = before[key]
+                continue
+            self._bound: list[Bound | Words] = []
+            self._rows[key] = Row(build(), self._bound)
+        if list(self._rows) != list(before):
+            self._forms[:] = [one for row in self._rows.values() for one in row.panels]
 
-    def _outliers(self, site: Site) -> list[Any]:
-        """Return how the outliers of the survey are mended."""
-        found = spikes(np.array(site.slope.points, dtype=np.float64))
-        out: list[Any] = [heading("Doubtful points of the survey")] if found else []
-        for k, height in found:
-            x, y = site.slope.points[k]
-            words = (
-                f"Point {k + 1} at chainage {x:g}, elevation {y:g} metres, is {abs(height):.1f} "
-                f"metres {'above' if height > 0 else 'below'} both neighbours."
-            )
-            out += [
-                text(words),
-                pn.Row(
-                    button("Put it on the line", partial(self._put_on_line, k)),
-                    button("Remove the point", partial(self._remove_point, k)),
-                ),
-            ]
-        return out
+    def _needed(self, site: Site) -> Iterator[tuple[Key, Callable[[], list[Any]]]]:
+        """Yield the rows of the forms, each with what it depends on other than values."""
+        for k, height in spikes(np.array(site.slope.points, dtype=np.float64)):
+            yield ("outlier", k, round(height, 3)), partial(self._outlier, site, k, height)
+        yield ("rock",), lambda: [heading("Where rock starts")]
+        for i, source in enumerate(site.sources):
+            yield ("source", i, source.band is None), partial(self._source, i, source.band is None)
+        yield ("new band",), lambda: [button("Add a source band", self._add_band)]
+        yield ("road",), self._places_of_road
+        yield ("grounds",), lambda: [heading("Grounds")]
+        for name in dict.fromkeys(site.slope.chain()[1]):
+            known = site.surfaces[name].ground in GROUNDS
+            yield ("ground", name, known), partial(self._ground_row, name, known)
+        surface = site.slope.surface
+        yield ("slope", surface), lambda: [text(f"The slope is {surface}, except on stretches:")]
+        for i, stretch in enumerate(site.slope.surfaces):
+            yield ("stretch", i, stretch.surface), partial(self._stretch, i, stretch.surface)
+        yield ("new stretch",), self._new_stretch
+        yield ("events",), lambda: [heading("Events")]
+        sources = tuple(source.name for source in site.sources)
+        for i, event in enumerate(site.events):
+            place = sources.index(event.source)
+            sized = site.sources[place].band is not None and event.area is not None
+            from_ = place if sized else None
+            yield ("event", i, sources, from_), partial(self._event, i, sources, from_)
+        yield ("new event",), lambda: [button("Add an event", self._add_event)]
+        yield (
+            ("import",),
+            lambda: [
+                pn.Card(self._import, title="Import a survey", collapsed=True, width=WIDE - 30)
+            ],
+        )
+
+    def _outlier(self, site: Site, k: int, height: float) -> list[Any]:
+        """Return how an outlier of the survey is mended."""
+        x, y = site.slope.points[k]
+        words = (
+            f"Point {k + 1} at chainage {x:g}, elevation {y:g} metres, is {abs(height):.1f} "
+            f"metres {'above' if height > 0 else 'below'} both neighbours."
+        )
+        return [
+            heading("A doubtful point of the survey"),
+            text(words),
+            pn.Row(
+                button("Put it on the line", partial(self._put_on_line, k)),
+                button("Remove the point", partial(self._remove_point, k)),
+            ),
+        ]
 
     def _put_on_line(self, k: int) -> None:
         (x0, y0), (x, _), (x1, y1) = self.project.site.slope.points[k - 1 : k + 2]
@@ -208,21 +239,45 @@ class SlopeTab:
             )
         )
 
-    def _rock(self, site: Site) -> list[Any]:
-        out: list[Any] = [heading("Where rock starts")]
-        for i, source in enumerate(site.sources):
-            if source.band is None:
-                words = "a mass cut by joints, or surveyed blocks; edit it in the site file"
-                out.append(text(f"{source.name}: {words}"))
-                continue
-            out += [
-                text(source.name),
-                pn.Row(
-                    self._number("Upper end [metres]", ("sources", i, "band", 0)),
-                    self._number("Lower end [metres]", ("sources", i, "band", 1)),
-                ),
-            ]
-        return out
+    def _source(self, i: int, massive: bool) -> list[Any]:
+        """Return the inputs for a source of rock."""
+        get = partial(_value, self.project, ("sources", i, "name"))
+        name = self._name("Name of the source", get, partial(self._rename_source, i))
+        head = pn.Row(name, self._remover(partial(self._remove_source, i), "this source"))
+        if massive:
+            words = "A mass cut by joints, or surveyed blocks; edit it in the site file."
+            return [head, text(words)]
+        ends = [
+            self._number(f"{words} end [metres]", ("sources", i, "band", k))
+            for k, words in enumerate(("Upper", "Lower"))
+        ]
+        return [head, pn.Row(*ends)]
+
+    def _name(self, label: str, get: Callable[[], Any], write: Callable[[Any], None]) -> Any:
+        """Return an input for a name."""
+        found = Bound(pn.widgets.TextInput(label=label, width=230, margin=(2, 8)), get, write)
+        self._bound.append(found)
+        return found.widget
+
+    def _remover(self, do: Callable[[], object], what: str) -> Any:
+        """Return a button that removes something."""
+        return button("Remove", do, width=85, margin=(18, 8, 0, 8), description=f"Remove {what}")
+
+    def _edit(self, change: Callable[[str], str], words: str) -> None:
+        self.page.act(lambda: self.project.change_site(change, words))
+
+    def _add_band(self) -> None:
+        site = self.project.site
+        self._edit(lambda old: parts.with_band(old, site), "added a source band")
+
+    def _remove_source(self, i: int) -> None:
+        site = self.project.site
+        words = f"removed {site.sources[i].name} and its events"
+        self._edit(lambda old: parts.without_source(old, site, i), words)
+
+    def _rename_source(self, i: int, name: str) -> None:
+        site = self.project.site
+        self._edit(lambda old: parts.renamed_source(old, site, i, name), f"named a source {name}")
 
     def _places_of_road(self) -> list[Any]:
         return [
@@ -237,22 +292,59 @@ class SlopeTab:
             ),
         ]
 
-    def _grounds(self, site: Site) -> list[Any]:
-        """Return the choice of the ground of each surface, and what it is."""
-        out: list[Any] = [heading("Grounds")]
-        options = {f"{name.replace('_', ' ')}": name for name in GROUNDS}
-        for name in dict.fromkeys(site.slope.chain()[1]):
-            path = ("surfaces", name, "ground")
-            known = (
-                options if site.surfaces[name].ground in GROUNDS else {"own values": None} | options
-            )
-            bound = choice(
-                f"Ground of {name}", known, partial(self._ground, name), self._set(path, name), 330
-            )
-            told = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
-            self._bound += [bound, Words(told, partial(self._ground_words, name))]
-            out += [bound.widget, told]
-        return out
+    def _ground_row(self, name: str, known: bool) -> list[Any]:
+        """Return the choice of the ground of a surface, and what it is."""
+        path = ("surfaces", name, "ground")
+        library = {one.replace("_", " "): one for one in GROUNDS}
+        options = library if known else {"own values": None} | library
+        bound = choice(
+            f"Ground of {name}", options, partial(self._ground, name), self._set(path, name), 330
+        )
+        told = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
+        self._bound += [bound, Words(told, partial(self._ground_words, name))]
+        return [bound.widget, told]
+
+    def _stretch(self, i: int, surface: str) -> list[Any]:
+        """Return the inputs for a stretch of a ground."""
+        name = surface.replace("_", " ")
+        ends = [
+            self._number(f"{name} {words} [metres]", (*parts.STRETCHES, i, end), width=145)
+            for end, words in (("start", "from"), ("end", "to"))
+        ]
+        remove = self._remover(partial(self._remove_stretch, i), "this stretch")
+        return [pn.Row(*ends, remove)]
+
+    def _new_stretch(self) -> list[Any]:
+        """Return the form that lays another stretch."""
+        ground = pn.widgets.Select(
+            label="Ground of a new stretch", width=330, margin=(2, 8),
+            options={name.replace("_", " "): name for name in GROUNDS},
+        )  # fmt: skip
+        ends = [
+            pn.widgets.FloatInput(label=f"{words} [metres]", value=None, width=145, margin=(2, 8))
+            for words in ("From", "To")
+        ]
+        lay = button(
+            "Add", lambda: self._add_stretch(ground.value, *(one.value for one in ends)),
+            width=85, margin=(18, 8, 0, 8), description="Lay this ground over the others there",
+        )  # fmt: skip
+        return [ground, pn.Row(*ends, lay)]
+
+    def _add_stretch(self, ground: str, start: float | None, end: float | None) -> None:
+        site = self.project.site
+
+        def change(old: str) -> str:
+            if start is None or end is None:
+                hint = "enter the chainages where the stretch begins and where it ends"
+                raise BadInput("new stretch", None, hint)
+            return parts.with_stretch(old, site, ground, start, end)
+
+        self._edit(change, f"added a stretch of {ground.replace('_', ' ')}")
+
+    def _remove_stretch(self, i: int) -> None:
+        site = self.project.site
+        words = f"removed a stretch of {site.slope.surfaces[i].surface}"
+        self._edit(lambda old: parts.without_stretch(old, site, i), words)
 
     def _ground(self, name: str) -> str | None:
         found = self.project.site.surfaces[name].ground
@@ -268,30 +360,48 @@ class SlopeTab:
             f"rolling resistance {ground.rolling.low:g} to {ground.rolling.high:g}"
         )
         quiet = f"margin:0;color:{self.theme.quiet}"
-        return f"<p style='{quiet}'>{html.escape(ground.words)}: {spans}</p>"
+        used = list(dict.fromkeys(self.project.site.slope.chain()[1]))
+        colour = ground_colour(self.theme, used, name) if name in used else "none"
+        mark = f"display:inline-block;width:22px;height:11px;background:{colour}"
+        told = f"{html.escape(ground.words)}: {spans}"
+        return f"<p style='{quiet}'><span style='{mark}'></span> {told}</p>"
 
-    def _events(self, site: Site) -> list[Any]:
-        out: list[Any] = [heading("Events")]
-        bands = {s.name for s in site.sources if s.band is not None}
-        for i, event in enumerate(site.events):
-            out.append(text(f"{event.name}, from {event.source}"))
-            period = number(
-                "Return period on 100 metres [years]",
-                partial(_period, self.project, i), partial(self._set_period, i), 1.0, 230,
-                start=1e-3,
-            )  # fmt: skip
-            design = Bound(
-                pn.widgets.Checkbox(label="Design event", margin=(18, 8)),
-                partial(_design, self.project, i),
-                self._set(("events", i, "design"), "design event"),
-            )
-            self._bound += [period, design]
-            out.append(pn.Row(period.widget, design.widget))
-            if event.source in bands and event.area is not None:
-                out += self._sizes(i)
-        return out
+    def _event(self, i: int, sources: tuple[str, ...], place: int | None) -> list[Any]:
+        """Return the inputs for an event; `place` is that of its band if it has sizes of blocks."""
+        get = partial(_value, self.project, ("events", i, "name"))
+        name = self._name(
+            "Name of the event", get, self._set(("events", i, "name"), "the name of an event")
+        )
+        source = choice(
+            "Rock from", list(sources), partial(_value, self.project, ("events", i, "source")),
+            self._set(("events", i, "source"), "the source of an event"), 230,
+        )  # fmt: skip
+        period = number(
+            "Return period on 100 metres [years]", partial(_period, self.project, i),
+            partial(self._set_period, i), 1.0, 230, start=1e-3,
+        )  # fmt: skip
+        design = Bound(
+            pn.widgets.Checkbox(label="Design event", margin=(18, 8)),
+            partial(_design, self.project, i),
+            self._set(("events", i, "design"), "design event"),
+        )
+        self._bound += [source, period, design]
+        rows = [
+            pn.Row(name, self._remover(partial(self._remove_event, i), "this event")),
+            source.widget,
+            pn.Row(period.widget, design.widget),
+        ]
+        return rows if place is None else rows + self._sizes(i, place)
 
-    def _sizes(self, i: int) -> list[Any]:
+    def _add_event(self) -> None:
+        site = self.project.site
+        self._edit(lambda old: parts.with_event(old, site), "added an event")
+
+    def _remove_event(self, i: int) -> None:
+        words = f"removed {self.project.site.events[i].name}"
+        self._edit(lambda old: parts.without_event(old, i), words)
+
+    def _sizes(self, i: int, place: int) -> list[Any]:
         """Return the inputs for the volumes of the blocks of an event, and their shapes."""
         volumes = [
             number(
@@ -301,10 +411,6 @@ class SlopeTab:
             for k, words in enumerate(("Least", "Greatest"))
         ]  # fmt: skip
         self._bound += volumes
-        place = next(
-            k for k, s in enumerate(self.project.site.sources)
-            if s.name == self.project.site.events[i].source
-        )  # fmt: skip
         shape = [
             self._number("Exponent of volumes [-]", ("events", i, "exponent"), step=0.1, width=150),
             self._number("Longest over broadest [-]", ("sources", place, "aspect", 1), step=0.1,
@@ -327,16 +433,13 @@ class SlopeTab:
         self._change(values, "set the volume of blocks")
 
     def _change(self, values: dict[Path_, Any], words: str) -> None:
-        def change(old: str) -> str:
-            return edits.with_values(old, values)
-
-        self.page.act(lambda: self.project.change_site(change, words))
+        self._edit(lambda old: edits.with_values(old, values), words)
 
     def _importer(self) -> Any:
         """Return the form that makes a site of a survey."""
         name = pn.widgets.TextInput(label="Name of the site", value="section", width=340)
         file = pn.widgets.FileInput(
-            label="Survey", accept=".csv,.txt,.tsv,.xyz,.dat,.dxf", width=340
+            label="Survey (CSV or DXF)", accept=".csv,.txt,.tsv,.xyz,.dat,.dxf", width=340
         )
         layer = pn.widgets.TextInput(label="Layer of a drawing, if it has several", width=340)
         road = [
@@ -344,24 +447,34 @@ class SlopeTab:
             for w in ("one", "other")
         ]
 
+        def begin() -> None:
+            self.page.say("One moment: the survey is read.")
+            soon(make)
+
         def make() -> None:
-            self.page.act(
-                lambda: self._import_survey(
-                    name.value, file, layer.value or None, [r.value for r in road]
+            notes: list[str] = []
+            ends = [one.value for one in road]
+            if self.page.act(
+                lambda: notes.extend(
+                    self._import_survey(name.value, file, layer.value or None, ends)
                 )
-            )
+            ):
+                self.page.say("; ".join([f"The site is made of {file.filename}", *notes]))
 
         return pn.Column(
             text("A table (CSV) with chainage and elevation in metres, or a drawing (DXF) with a "
                  "polyline. What is left empty becomes a placeholder to replace."),
-            name, text("Survey (CSV or DXF)"), file, layer, pn.Row(*road),
-            button("Make the site", make, primary=True),
+            name, file, layer, pn.Row(*road),
+            button("Make the site", begin, primary=True),
             width=WIDE - 40,
         )  # fmt: skip
 
-    def _import_survey(self, name: str, file: Any, layer: str | None, road: list[Any]) -> None:
-        """Make a site of the survey that was chosen, in the place of the present one."""
-        from rigdda.app import new_site
+    def _import_survey(
+        self, name: str, file: Any, layer: str | None, road: list[Any]
+    ) -> tuple[str, ...]:
+        """Make a site of the survey in the place of the present one, and return what to note."""
+        with IMPORTING:
+            from rigdda.app import new_site
 
         if not file.value:
             raise BadInput("survey", None, "choose a file first")
@@ -377,7 +490,15 @@ class SlopeTab:
                 own = str(bad.field).replace(str(copy), file.filename)
                 raise BadInput(own, bad.value, bad.hint) from None
         self.project.change_site(lambda _: made, f"imported {file.filename}")
-        self.page.say("; ".join(found.notes))
+        return tuple(found.notes)
+
+
+class Row(NamedTuple):
+    """A row of the forms."""
+
+    panels: list[Any]
+    bound: list[Bound | Words]
+    """What follows the project."""
 
 
 class Words:
@@ -390,17 +511,6 @@ class Words:
     def refresh(self) -> None:
         """Show the text as it is now."""
         self.pane.object = self._get()
-
-
-def _structure(site: Site) -> Any:
-    """Return what the forms of a site depend on, other than values."""
-    points = np.array(site.slope.points, dtype=np.float64)
-    return (
-        tuple((s.name, s.band is None) for s in site.sources),
-        tuple((e.name, e.source, e.area is None) for e in site.events),
-        tuple(dict.fromkeys(site.slope.chain()[1])),
-        tuple((k, round(h, 3)) for k, h in spikes(points)),
-    )
 
 
 def _value(project: Any, path: Path_) -> Any:

@@ -14,6 +14,7 @@ import tomli_w
 
 from rigdda.app.page.jobs import Job
 from rigdda.app.page.live import Live
+from rigdda.app.page.loading import IMPORTING
 from rigdda.app.page.replays import Viewing
 from rigdda.app.page.state import LAYOUT, Project
 from rigdda.app.page.theme import Theme
@@ -115,7 +116,8 @@ class Workspace:
         found, project = self.live.figures, self.project
         if found is None or not found.releases or found.layout != project.layout:
             return
-        from rigdda.app.page.figures import study_table
+        with IMPORTING:
+            from rigdda.app.page.figures import study_table
 
         site = os.path.relpath(project.where.site, project.folder)
         table = study_table(site, found.layout, LAYOUT, found.releases)

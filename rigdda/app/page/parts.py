@@ -1,0 +1,153 @@
+"""Parts of a site that the page adds and removes: stretches of ground, source bands and events.
+
+Each function returns the text of a site file after the change. `Project.change_site` checks it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import Any
+
+import msgspec
+import tomlkit
+
+from rigdda import BadInput, Site
+from rigdda.app.page import edits
+from rigdda.ground.grounds import GROUNDS
+from rigdda.model.site_tables import Stretch
+
+STRETCHES = ("slope", "surfaces")
+"""Path of the stretches in a site file."""
+
+PERIOD, VOLUME = 10.0, (0.1, 1.0)
+"""Return period [years] and volumes [m3] of the event of a new band if the site has no band yet:
+placeholders that the user replaces."""
+
+
+def laid(stretches: Sequence[Stretch], new: Stretch) -> list[Stretch]:
+    """Return the stretches of a slope after another is laid over them, which cuts them.
+
+    Raises
+    ------
+    BadInput
+        If the new stretch does not end beyond its start.
+    """
+    if not new.end > new.start:
+        raise BadInput("end of the stretch", new.end, f"let it end beyond {new.start:g}")
+    found = [new]
+    for old in stretches:
+        pieces = (old.start, min(old.end, new.start)), (max(old.start, new.end), old.end)
+        found += [Stretch(low, high, old.surface) for low, high in pieces if high > low]
+    return sorted(found, key=lambda one: one.start)
+
+
+def with_stretch(text: str, site: Site, ground: str, start: float, end: float) -> str:
+    """Return the text with a stretch of a ground of the library; it cuts other stretches.
+
+    A surface that has this ground is used if the site has one, and otherwise added.
+
+    Raises
+    ------
+    BadInput
+        If the ground is not in the library, the stretch is not on the slope, or it has no length.
+    """
+    if ground not in GROUNDS:
+        raise BadInput("ground", ground, "choose one of the library")
+    first, last = site.slope.points[0][0], site.slope.points[-1][0]
+    for words, value in (("start", start), ("end", end)):
+        if not first <= value <= last:
+            hint = f"stay on the section, between {first:g} and {last:g}"
+            raise BadInput(f"{words} of the stretch", value, hint)
+    known = next((name for name, s in site.surfaces.items() if s.ground == ground), None)
+    name = known or _free(ground, site.surfaces)
+    if known is None:
+        text = edits.with_value(text, ("surfaces", name, "ground"), ground)
+    return _with_stretches(text, laid(site.slope.surfaces, Stretch(start, end, name)))
+
+
+def without_stretch(text: str, site: Site, place: int) -> str:
+    """Return the text without a stretch, so that the ground there is that of the slope."""
+    return _with_stretches(text, [s for i, s in enumerate(site.slope.surfaces) if i != place])
+
+
+def _with_stretches(text: str, stretches: Iterable[Stretch]) -> str:
+    rows = [msgspec.to_builtins(stretch) for stretch in stretches]
+    return edits.with_rows(text, STRETCHES, rows)
+
+
+def with_band(text: str, site: Site) -> str:
+    """Return the text with another source band and an event from it, both like the last ones.
+
+    The band lies in the middle of the longest part of the slope above its toe without a band.
+    """
+    bands = [k for k, source in enumerate(site.sources) if source.band is not None]
+    name = _free("band", (source.name for source in site.sources))
+    source: dict[str, Any] = _table(text, "sources", bands[-1]) if bands else {}
+    source |= {"name": name, "band": list(_room_for_band(site))}
+    text = edits.with_table(text, "sources", source)
+    like = site.sources[bands[-1]].name if bands else None
+    alike = [k for k, one in enumerate(site.events) if one.source == like]
+    new = {"return_period": PERIOD, "volume": list(VOLUME)}
+    event: dict[str, Any] = _table(text, "events", alike[-1]) if alike else new
+    event |= {"name": _free(f"block, {name}", site.event_names), "source": name}
+    return edits.with_table(text, "events", event)
+
+
+def _room_for_band(site: Site) -> tuple[float, float]:
+    """Return the middle third of the longest part of the slope without a band [m]."""
+    first, last = site.slope.points[0][0], min(site.slope.toe, site.road.start)
+    ends = [first]
+    for low, high in sorted(s.band for s in site.sources if s.band is not None):
+        ends += [low, high]
+    gaps = list(pairwise([*ends, last]))[::2]
+    low, high = max(gaps, key=lambda gap: gap[1] - gap[0])
+    third = (high - low) / 3.0
+    return round(low + third, 1), round(high - third, 1)
+
+
+def without_source(text: str, site: Site, place: int) -> str:
+    """Return the text without a source and without the events from it."""
+    name = site.sources[place].name
+    for k in reversed(range(len(site.events))):
+        if site.events[k].source == name:
+            text = edits.without(text, ("events", k))
+    return edits.without(text, ("sources", place))
+
+
+def renamed_source(text: str, site: Site, place: int, name: str) -> str:
+    """Return the text with another name of a source, which its events follow."""
+    values: dict[tuple[str | int, ...], Any] = {("sources", place, "name"): name}
+    for k, event in enumerate(site.events):
+        if event.source == site.sources[place].name:
+            values["events", k, "source"] = name
+    return edits.with_values(text, values)
+
+
+def with_event(text: str, site: Site) -> str:
+    """Return the text with another event like the last one."""
+    last = len(site.events) - 1
+    event = _table(text, "events", last)
+    event["name"] = _free(site.events[last].name, site.event_names)
+    return edits.with_table(text, "events", event)
+
+
+def without_event(text: str, place: int) -> str:
+    """Return the text without an event."""
+    return edits.without(text, ("events", place))
+
+
+def _table(text: str, name: str, place: int) -> dict[str, Any]:
+    """Return the values of a table in a list of the file."""
+    found: dict[str, Any] = tomlkit.parse(text).unwrap()[name][place]
+    return found
+
+
+def _free(name: str, taken: Iterable[str]) -> str:
+    """Return a name that is not taken: the name itself, or with another number at its end."""
+    stem, known, number, free = re.sub(r" \d+$", "", name), set(taken), 1, name
+    while free in known:
+        number += 1
+        free = f"{stem} {number}"
+    return free

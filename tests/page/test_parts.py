@@ -1,0 +1,104 @@
+"""Parts of a site that the page adds and removes."""
+
+import pytest
+
+from rigdda import BadInput, Site, sites
+from rigdda.app.page import parts
+from rigdda.model.site_tables import Stretch
+
+BLOCKS = """
+[[slope.surfaces]]
+start = 10.0
+end = 20.0
+surface = "soil"
+"""
+
+
+def _ends(site):
+    return [(s.start, s.end, s.surface) for s in site.slope.surfaces]
+
+
+@pytest.mark.parametrize(
+    ("new", "expected"),
+    [
+        (
+            (12.0, 15.0),
+            [(10.0, 12.0, "a"), (12.0, 15.0, "new"), (15.0, 20.0, "a"), (20.0, 30.0, "b")],
+        ),
+        ((5.0, 25.0), [(5.0, 25.0, "new"), (25.0, 30.0, "b")]),
+        ((10.0, 20.0), [(10.0, 20.0, "new"), (20.0, 30.0, "b")]),
+        ((40.0, 41.0), [(10.0, 20.0, "a"), (20.0, 30.0, "b"), (40.0, 41.0, "new")]),
+    ],
+)  # fmt: skip
+def test_a_stretch_cuts_those_that_it_is_laid_over(new, expected):
+    before = [Stretch(10.0, 20.0, "a"), Stretch(20.0, 30.0, "b")]
+    found = parts.laid(before, Stretch(*new, "new"))
+    assert [(s.start, s.end, s.surface) for s in found] == expected
+
+
+def test_a_stretch_uses_the_surface_of_its_ground_or_adds_one():
+    text, site = sites.text("verge"), Site.load("verge")
+    known = next(name for name, s in site.surfaces.items() if s.ground is not None)
+    same = parts.with_stretch(text, site, site.surfaces[known].ground, 6.0, 7.0)
+    assert (6.0, 7.0, known) in _ends(Site.parse(same, "site.toml"))
+    new = parts.with_stretch(text, site, "coarse_talus", 6.0, 7.0)
+    changed = Site.parse(new, "site.toml")
+    assert (6.0, 7.0, "coarse_talus") in _ends(changed)
+    assert changed.surfaces["coarse_talus"].ground == "coarse_talus"
+    place = _ends(changed).index((6.0, 7.0, "coarse_talus"))
+    without = Site.parse(parts.without_stretch(new, changed, place), "site.toml")
+    assert without.slope.surface_at(6.5) == without.slope.surface
+
+
+def test_stretches_written_as_tables_stay_a_valid_file():
+    text, site = sites.text("quick"), Site.load("quick")
+    for k in range(len(site.slope.surfaces)):
+        text = parts.without_stretch(text, site, 0)
+        site = Site.parse(text, "site.toml")
+        assert len(site.slope.surfaces) == len(Site.load("quick").slope.surfaces) - k - 1
+    start = text.index("[slope]")
+    end = text.index("\n[", start)
+    kept = [line for line in text[start:end].splitlines() if not line.startswith("surfaces")]
+    surface = next(iter(site.surfaces))
+    tables = "\n".join(kept) + BLOCKS.replace("soil", surface)
+    text = text[:start] + tables + text[end:]
+    site = Site.parse(text, "site.toml")
+    changed = Site.parse(parts.with_stretch(text, site, "concrete", 12.0, 13.0), "site.toml")
+    assert _ends(changed) == [
+        (10.0, 12.0, surface), (12.0, 13.0, "concrete"), (13.0, 20.0, surface)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("start", "end"), [(-50.0, 5.0), (5.0, 5e3), (8.0, 8.0)])
+def test_a_stretch_off_the_section_or_without_length_is_refused(start, end):
+    with pytest.raises(BadInput, match="stretch"):
+        parts.with_stretch(sites.text("verge"), Site.load("verge"), "concrete", start, end)
+
+
+@pytest.mark.parametrize("name", ["quick", "verge"])
+def test_a_band_comes_with_an_event_and_goes_with_it(name):
+    text, site = sites.text(name), Site.load(name)
+    added = parts.with_band(text, site)
+    more = Site.parse(added, "site.toml")
+    band, event = more.sources[-1], more.events[-1]
+    assert (len(more.sources), len(more.events)) == (len(site.sources) + 1, len(site.events) + 1)
+    assert event.source == band.name
+    assert site.slope.points[0][0] < band.band[0] < band.band[1] < site.slope.toe
+    other = Site.parse(parts.renamed_source(added, more, len(site.sources), "spur"), "site.toml")
+    assert (other.sources[-1].name, other.events[-1].source) == ("spur", "spur")
+    fewer = Site.parse(parts.without_source(added, more, len(site.sources)), "site.toml")
+    assert (fewer.sources, fewer.events) == (site.sources, site.events)
+
+
+def test_events_are_copied_under_names_that_are_free():
+    text, site = sites.text("verge"), Site.load("verge")
+    last = site.events[-1]
+    for number in (2, 3):
+        text = parts.with_event(text, site)
+        site = Site.parse(text, "site.toml")
+        assert site.events[-1].source == last.source
+        assert site.events[-1].rate == last.rate
+        assert len(set(site.event_names)) == len(site.events)
+        assert site.events[-1].name.endswith(str(number))
+    fewer = Site.parse(parts.without_event(text, len(site.events) - 1), "site.toml")
+    assert fewer.events == site.events[:-1]

@@ -25,11 +25,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from rigdda import Layout, check
+from rigdda.agents.designers import policy
 from rigdda.agents.designers.catalogue import ensemble_for
-from rigdda.agents.designers.convex import offered, unsearched
+from rigdda.agents.designers.convex import unsearched
 from rigdda.agents.designers.forecast import Forecast, Value, value_network
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, search
+from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress
 from rigdda.agents.designers.racing import KEPT, Arm, Floats, Track, best_of_ends
 from rigdda.agents.designers.store import Store
 from rigdda.agents.designers.surrogate import COMMON, Surrogate, expected_gain
@@ -39,7 +40,7 @@ EXPLORE, FINAL_SHARE = 0.55, 0.28
 """Shares of the budget for the exploration and for the final [-]. The rest is for the ensemble and
 the report."""
 LEAST_FINAL_BUDGET = 160
-"""Least budget for a final. With less, the layouts with the best forecasts are compared at once."""
+"""Least budget for a final. With less, the layout of the policy is built without a search."""
 EACH, LEAST_EXPLORED, MOST_EXPLORED = 0.9, 10, 100
 """Releases of a layout in the exploration over the square root of the budget, and their bounds."""
 BATCHES = 3
@@ -69,7 +70,8 @@ def design(
 ) -> DesignResult:
     """Return the best layout that is found within the budget.
 
-    If the budget is too small for a final, the best of the starting layouts is returned.
+    If the budget is too small for a final, the designer `policy` is used: a comparison of layouts
+    on a few releases would choose a worse layout than it does (`experiments.policy_search`).
 
     Parameters
     ----------
@@ -85,9 +87,9 @@ def design(
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     check.number("precision", precision, 0.0, 1.0)
-    ledger = Ledger(problem, simulations, seed, progress, store)
     if simulations < LEAST_FINAL_BUDGET:
-        return search(ledger, offered(ledger))
+        return policy.design(problem, simulations, seed, progress, store)
+    ledger = Ledger(problem, simulations, seed, progress, store)
     menu, track = Menu(problem), Track(ledger)
     known = unsearched(problem, menu)
     surrogate = forecast_pool(ledger, menu, known)

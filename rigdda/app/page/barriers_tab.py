@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from rigdda.app.page.state import Project
     from rigdda.app.page.workspace import Host
 
-AROUND = 345
-"""Height of the window that is left for what stands above and below the section [pixels]."""
-
 DRAWN = 200
 """Number of releases whose paths are drawn."""
 
@@ -51,7 +48,7 @@ class BarriersTab:
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
         self.live = page.workspace.live
-        self.section = Section(self.theme, "Section with barriers", around=AROUND)
+        self.section = Section(self.theme, "Section with barriers")
         self._grips: list[Grip] = []
         self._handles = HandleSource(self.section.plot, self._dragged)
         self._draw_handles()

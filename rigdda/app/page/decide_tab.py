@@ -20,7 +20,7 @@ from rigdda.app.page.jobs import CANCELLED, FAILED, INTERRUPTED, RUNNING, Tried,
 from rigdda.app.page.known_layout import MOST_BARRIERS
 from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.section import plain_axes
-from rigdda.app.page.theme import SERIES, TALL, WRAPPED, growing
+from rigdda.app.page.theme import SERIES, TALL, WRAPPED
 from rigdda.envs import DesignProblem
 from rigdda.fields import described
 from rigdda.ground.prices import Consequences, Prices
@@ -153,7 +153,7 @@ class DecideTab:
 
     def _diagram(self) -> Any:
         plot = figure(
-            height=290, sizing_mode="stretch_width", styles=growing(290, 430),
+            height=290, sizing_mode="stretch_width",
             tools="pan,wheel_zoom,box_zoom,reset",
             title="Cost against risk; a click takes a layout",
             x_axis_label="capital and upkeep [EUR per metre of road and year]",

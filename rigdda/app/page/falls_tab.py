@@ -107,7 +107,7 @@ class FallsTab:
 
     def __init__(self, page: Host):
         self.page, self.project, self.theme = page, page.project, page.theme
-        self.section = Section(self.theme, "Releases; a click on a path replays it", 280, 440)
+        self.section = Section(self.theme, "Releases; a click on a path replays it", 280)
         self._release: Release | None = None
         self._passed: Passed | None = None
         self._shown: Any = None

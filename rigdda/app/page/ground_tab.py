@@ -74,7 +74,7 @@ class GroundTab:
         self._count = self._drawn = 0
         self._release: Release | None = None
         self._parameters: dict[str, Parameter] = {}
-        self.section = Section(self.theme, "Observed and computed on the section", 290, 430)
+        self.section = Section(self.theme, "Observed and computed on the section", 290)
         self._stops = ColumnDataSource({"x": [], "y": [], "words": []})
         self._marks = ColumnDataSource({"x": [], "y": []})
         self._hits = ColumnDataSource({"x": [], "y": []})

@@ -14,7 +14,7 @@ from bokeh.plotting import figure
 
 from rigdda import BadInput, Layout, Site
 from rigdda.app.page.locking import on_change
-from rigdda.app.page.theme import Theme, growing
+from rigdda.app.page.theme import Theme
 from rigdda.app.reports.source_outlines import sources
 from rigdda.barriers import Earthwork, earthworks
 from rigdda.model.survey import spikes
@@ -26,10 +26,7 @@ BORDER = 62
 """Space left of an axis, so that figures below one another are aligned [pixels]."""
 
 HEIGHT = 400
-"""Least height of the figure [pixels]."""
-
-AROUND = 320
-"""Height of the window that is left for what stands above and below the figure [pixels]."""
+"""Height of the figure [pixels]."""
 
 MOVED = 1e-6
 """Distance from which on a handle has been moved [m]."""
@@ -68,9 +65,7 @@ class Section:
     name : str
         Title of the figure.
     height : int
-        Its least height [pixels].
-    around : int
-        Height of the window that is left for what stands above and below it [pixels].
+        Its height [pixels].
     coordinates : bool
         Whether it shows the coordinates and the inclination of the ground under the cursor.
 
@@ -80,18 +75,10 @@ class Section:
         The figure.
     """
 
-    def __init__(
-        self,
-        theme: Theme,
-        name: str,
-        height: int = HEIGHT,
-        around: int = AROUND,
-        coordinates: bool = False,
-    ):
+    def __init__(self, theme: Theme, name: str, height: int = HEIGHT, coordinates: bool = False):
         self.theme, self._coordinates = theme, coordinates
         self.plot = figure(
             height=height, sizing_mode="stretch_width", match_aspect=True,
-            styles=growing(height, around),
             tools="pan,wheel_zoom,box_zoom,reset", active_scroll="wheel_zoom", active_drag="pan",
             x_axis_label="chainage [metres]", y_axis_label="elevation [metres]",
             toolbar_location="right", name=name, min_border_left=BORDER,

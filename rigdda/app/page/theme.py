@@ -63,19 +63,5 @@ def tab_css(theme: Theme) -> str:
 TALL = {"height": "max(610px, calc(100vh - 100px))"}
 """Style of a column as high as the window below the titles of the tabs."""
 
-
-def growing(least: int, around: int) -> dict[str, str]:
-    """Return the style of a figure that takes the height of the window.
-
-    Parameters
-    ----------
-    least : int
-        Its least height [pixels].
-    around : int
-        Height of the window that it leaves for what stands above and below it [pixels].
-    """
-    return {"height": f"max({least}px, calc(100vh - {around}px))"}
-
-
 WRAPPED = ".bk-input-group { display: flex; flex-wrap: wrap; }"
 """Style of options in a row that continue in the next line."""

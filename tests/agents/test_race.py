@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from valley import SITE, Barren, Valley
 
 from rigdda import Ditch, Fence, GravityWall, Site
-from rigdda.agents.designers import race, random
+from rigdda.agents.designers import policy, race, random
 from rigdda.agents.designers.menu import Menu, on_bound, spread
 from rigdda.agents.designers.protocol import Entry
 from rigdda.agents.designers.racing import Arm, allocation, behind
@@ -38,6 +38,11 @@ def test_the_race_beats_random_search(valley: Valley) -> None:
     raced = [valley.truth(race.design(valley, 2500, seed).layout) for seed in seeds]
     drawn = [valley.truth(random.design(valley, 2500, seed).layout) for seed in seeds]
     assert np.mean(raced) < np.mean(drawn)
+
+
+def test_without_releases_for_a_final_the_policy_decides() -> None:
+    problem, few = DesignProblem("quick"), race.LEAST_FINAL_BUDGET - 1
+    assert race.design(problem, few).layout == policy.design(problem, few).layout
 
 
 @pytest.mark.parametrize("name", [pytest.param("race", marks=pytest.mark.slow), "random"])

@@ -247,12 +247,6 @@ def known(problem: DesignProblem, menu: Menu) -> list[Layout]:
     return [layout for layout in dict.fromkeys(layouts) if layout and problem.fits(layout)]
 
 
-def offered(ledger: Ledger) -> Proposals:
-    """Yield the layouts of `starts`."""
-    for layout in starts(ledger):  # noqa: UP028, a list cannot be sent values
-        yield layout
-
-
 def _smaller(layout: Layout, lower: int, weaker: int) -> Layout:
     """Return a layout with its fences reduced by some steps of height and of class."""
     out = []

@@ -21,9 +21,10 @@ from typing import Any
 
 import click
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from experiments.script import Number, folder, options, say, write
+from experiments.script import BLUE, GREY, Number, draw, folder, options, say, write
 from rigdda.app.exam import ranking, specification
 from rigdda.app.exam.scorer import Scorer
 from rigdda.app.exam.specification import ExamPart
@@ -133,6 +134,28 @@ def stability(jobs: dict[tuple[str, int], Scorer]) -> tuple[float, list[dict[str
     return len(kept) / max(len(clear), 1), rows
 
 
+def draw_scores(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Draw the score of each entry with its interval, one panel for each track."""
+
+    def paint(sheet: Figure) -> None:
+        tracks = list(dict.fromkeys(row["track"] for row in rows))
+        panels = sheet.subplots(1, len(tracks), sharey=True, squeeze=False)[0]
+        for axes, track in zip(panels, tracks, strict=True):
+            own = [row for row in rows if row["track"] == track][::-1]
+            ends = [
+                [row["score"] - row["score_low"] for row in own],
+                [row["score_high"] - row["score"] for row in own],
+            ]
+            names = [f"{row['entry'].replace('_', ' ')}, {row['budget']:,}" for row in own]
+            scores = [row["score"] for row in own]
+            axes.errorbar(scores, names, xerr=ends, fmt="o", color=BLUE, capsize=3)
+            for anchor in (0.0, 1.0):
+                axes.axvline(anchor, color=GREY, linestyle=":")
+            axes.set(title=track, xlabel="score: 0 random layouts, 1 reference")
+
+    draw(path, (10.0, 1.0 + 0.17 * len(rows)), paint)
+
+
 def run(quick: bool, out: Path, budgets: Sequence[int] = ()) -> Number:
     """Write exam/leaderboard.csv, exam/leaderboard.png and exam/stability.csv."""
     work = WORK / "quick" if quick else WORK
@@ -152,7 +175,7 @@ def run(quick: bool, out: Path, budgets: Sequence[int] = ()) -> Number:
             write(out / "exam" / "leaderboard.csv", rows)
     told_apart(rows, compared)
     write(out / "exam" / "leaderboard.csv", rows)
-    ranking.draw(out / "exam" / "leaderboard.png", rows)
+    draw_scores(out / "exam" / "leaderboard.png", rows)
     share, table = stability(compared)
     write(out / "exam" / "stability.csv", table)
     note = "\n".join(

@@ -92,8 +92,13 @@ class RealNumber(_InRange, click.FloatRange):
     what = "a number"
 
 
-CHAINAGE = RealNumber(-1e6, 1e6)
-"""Option type for a chainage [m]."""
+class _Coordinate(_InRange, click.types.FloatParamType):
+    what = "a number"
+    min = max = None
+
+
+CHAINAGE = _Coordinate()
+"""Option type for a chainage [m], which may be a coordinate of a country."""
 
 
 def out_option(default: str) -> Callable[..., Any]:

@@ -47,7 +47,7 @@ class SlopeTab:
         self.page, self.project, self.theme = page, page.project, page.theme
         self.section = Section(self.theme, "Section of the slope", coordinates=True)
         self._handles: list[Handle] = []
-        self._rows: dict[Key, Row] = {}
+        self._rows: dict[Key, FormRow] = {}
         self._places = HandleSource(self.section.plot, self._dragged)
         self._points = HandleSource(self.section.plot, self._dragged_point)
         self._draw_handles()
@@ -171,7 +171,7 @@ class SlopeTab:
                 self._rows[key] = before[key]
                 continue
             self._bound: list[Bound | Words] = []
-            self._rows[key] = Row(build(), self._bound)
+            self._rows[key] = FormRow(build(), self._bound)
         if list(self._rows) != list(before):
             self._forms[:] = [one for row in self._rows.values() for one in row.panels]
 
@@ -493,7 +493,7 @@ class SlopeTab:
         return tuple(found.notes)
 
 
-class Row(NamedTuple):
+class FormRow(NamedTuple):
     """A row of the forms."""
 
     panels: list[Any]

@@ -38,7 +38,7 @@ SEARCHES = ("value", "policy", "race", "random_search", "cma", "tpe", "convex")
 """Entries that search."""
 
 BUDGETS, QUICK_BUDGETS = (0, 500), (0, 60)
-"""Budgets by default. `--budget` adds others; rows for 2,000 and 10,000 releases take hours."""
+"""Budgets by default; `--budget` adds others."""
 
 STABLE, QUICK_STABLE = 0.95, 0.0
 """Least share of the pairs told apart that have the same order on a second set of releases [-]."""

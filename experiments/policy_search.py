@@ -28,10 +28,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.no_search import forecast
-from experiments.policy_table import FRESH, problems
+from experiments.policy_table import FRESH, problems, resumed
 from experiments.script import GREY, Number, interval, main, say, write
 from experiments.script import draw as drawn
-from experiments.search_gain import load
 from rigdda import MECHANICS, Layout
 from rigdda.agents import designers
 from rigdda.agents.designers import policy, race
@@ -166,10 +165,7 @@ def draw(path: Path, rows: Sequence[Any], budgets: Sequence[int]) -> None:
 def run(quick: bool, out: Path) -> Number:
     """Write policy_search.csv and policy_search.png."""
     path, releases = out / "policy_search.csv", QUICK_RELEASES if quick else RELEASES
-    budgets, table = QUICK_BUDGETS if quick else BUDGETS, policy.load().network.notes["table"]
-    rows: list[Any] = [
-        row for row in load(path) if row["table"] == table and row["releases"] == str(releases)
-    ]
+    budgets, rows = QUICK_BUDGETS if quick else BUDGETS, resumed(path, releases)
     known = {row["site"] for row in rows}
     for problem in problems(QUICK_SITES if quick else SITES):
         if problem.site.name not in known:

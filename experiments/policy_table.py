@@ -82,6 +82,12 @@ def problems(count: int) -> list[DesignProblem]:
     return found
 
 
+def resumed(path: Path, releases: int) -> list[Any]:
+    """Return the rows of an earlier run with the same policy and as many releases a layout."""
+    table = policy.load().network.notes["table"]
+    return [r for r in load(path) if r["table"] == table and r["releases"] == str(releases)]
+
+
 def differences(rows: Sequence[Any], others: Sequence[str]) -> dict[str, tuple[float, float]]:
     """Return how far the policy is ahead of each method: mean and half width [-]."""
     own = relative(rows, "policy")
@@ -91,10 +97,7 @@ def differences(rows: Sequence[Any], others: Sequence[str]) -> dict[str, tuple[f
 def run(quick: bool, out: Path) -> Number:
     """Write policy_table.csv."""
     path, releases = out / "policy_table.csv", QUICK_RELEASES if quick else RELEASES
-    table = policy.load().network.notes["table"]
-    rows: list[Any] = [
-        row for row in load(path) if row["table"] == table and row["releases"] == str(releases)
-    ]
+    rows = resumed(path, releases)
     known = {row["site"] for row in rows}
     for problem in problems(QUICK_SITES if quick else SITES):
         if problem.site.name not in known:

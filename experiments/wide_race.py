@@ -17,9 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from experiments.no_search import relative
-from experiments.policy_table import FRESH, problems
+from experiments.policy_table import FRESH, problems, resumed
 from experiments.script import Number, interval, main, say, write
-from experiments.search_gain import load
 from rigdda import MECHANICS
 from rigdda.agents.designers import policy, race
 from rigdda.agents.designers.protocol import verify
@@ -58,11 +57,9 @@ def study(problem: DesignProblem, budget: int, releases: int) -> list[dict[str, 
 
 def run(quick: bool, out: Path) -> Number:
     """Write wide_race.csv."""
-    path, table = out / "wide_race.csv", policy.load().network.notes["table"]
+    path = out / "wide_race.csv"
     budget, releases = (QUICK_BUDGET, QUICK_RELEASES) if quick else (BUDGET, RELEASES)
-    rows: list[Any] = [
-        row for row in load(path) if row["table"] == table and row["budget"] == str(budget)
-    ]
+    rows = [row for row in resumed(path, releases) if row["budget"] == str(budget)]
     known = {row["site"] for row in rows}
     for problem in problems(QUICK_SITES if quick else SITES):
         if problem.site.name not in known:

@@ -27,7 +27,7 @@ HOST = "127.0.0.1"
 TOKEN = 24
 """Bytes of the token."""
 
-UNUSED = 120_000
+CONNECTION_WAIT = 120_000
 """Time for which a page without a connection is kept [ms]. A busy browser may connect long after it
 has got the page, and Bokeh would then make a page whose styles Panel takes from another machine."""
 
@@ -103,7 +103,8 @@ def serve(project: Project, port: int | None, browser: bool, say: Callable[[str]
             extra_patterns=[
                 ("/report/(.*)", StaticFileHandler, {"path": str(workspace.report_folder)})
             ],
-            check_unused_sessions_milliseconds=5000, unused_session_lifetime_milliseconds=UNUSED,
+            check_unused_sessions_milliseconds=5000,
+            unused_session_lifetime_milliseconds=CONNECTION_WAIT,
             transforms=[type("Guarded", (Guard,), {"hosts": frozenset(hosts)})],
         )  # fmt: skip
         address = f"http://{HOST}:{at}/{token}/"

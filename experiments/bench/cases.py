@@ -77,6 +77,9 @@ class Case:
         Whether blocks at rest may sleep.
     total : callable
         Combines the errors of the scenes.
+    greatest : callable or None
+        Returns the greatest error in any frame, which is recorded beside the error but decides
+        nothing; None: not recorded.
     """
 
     name: str
@@ -92,6 +95,7 @@ class Case:
     aim: float = 0.5
     sleeping: bool = False
     total: Callable[[list[float]], float] = max
+    greatest: Callable[[Scene, Floats, Floats], float] | None = None
 
 
 def slide_error(scene: Scene, times: Floats, poses: Floats) -> float:
@@ -144,6 +148,11 @@ def sinking(scene: Scene, times: Floats, poses: Floats) -> float:
     return float(penetration(scene, poses[times >= times[-1] - SETTLED]).max())
 
 
+def deep(scene: Scene, times: Floats, poses: Floats) -> float:
+    """Return the 95 % quantile over the frames of the greatest penetration in each [m]."""
+    return float(np.quantile(penetration(scene, poses), 0.95))
+
+
 def deepest(scene: Scene, times: Floats, poses: Floats) -> float:
     """Return the greatest penetration in all frames [m]."""
     return float(penetration(scene, poses).max())
@@ -176,14 +185,17 @@ def rockfall_scene(count: int, seed: int) -> Scene:
 
 
 def rockfall(count: int, seeds: int, must: float, aim: float) -> Case:
-    """Return the case of a rockfall, with the median over releases of the greatest penetration."""
+    """Return the case of a rockfall, with the median over releases of the penetration.
+
+    A single greatest penetration in a release is chaotic: rounding errors change it by half.
+    """
     return Case(
         f"rockfall-{count}",
-        "greatest penetration [m]",
+        "penetration, 95 % of the frames [m]",
         tuple(rockfall_scene(count, seed) for seed in range(1, seeds + 1)),
         RELEASE,
         FRAME,
-        deepest,
+        deep,
         tuple(part for part in PARTS if LONGEST / part <= FRAME),
         3 if count < 480 else 2,  # the third takes minutes and is never the best
         (0.05,),
@@ -191,6 +203,7 @@ def rockfall(count: int, seeds: int, must: float, aim: float) -> Case:
         aim,
         sleeping=True,
         total=lambda errors: float(np.median(errors)),
+        greatest=deepest,
     )
 
 
@@ -245,7 +258,7 @@ def quick_cases() -> tuple[Case, ...]:
     """Return all cases but the largest, with fewer steps and options.
 
     They have one scene each, except for rockfalls, whose error is a median over scenes because the
-    greatest penetration differs between releases.
+    penetration differs between releases.
     """
     return tuple(
         replace(

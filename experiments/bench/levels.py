@@ -16,8 +16,9 @@ CORE = "rigdda"
 class Row:
     """One engine with one setting on one case.
 
-    The error is in the unit of the case; the processor time of the steps per simulated second
-    [us/s] is given as median, minimum and maximum of the runs.
+    The error and the greatest error in any frame (not a number if it is not recorded) are in the
+    unit of the case. The processor time of the steps per simulated second [us/s] is given as
+    median, minimum and maximum of the runs.
     """
 
     case: str
@@ -25,6 +26,7 @@ class Row:
     dt: float
     options: str
     error: float
+    greatest: float
     cpu_us_per_simulated_s: float
     cpu_min: float
     cpu_max: float

@@ -57,6 +57,7 @@ class Setting:
     dt: float
     options: dict[str, Any]
     error: float = np.inf
+    greatest: float = np.nan
     cpu: list[float] = field(default_factory=list)
 
     @property
@@ -77,6 +78,7 @@ class Setting:
             self.dt,
             " ".join(f"{k}={v}" for k, v in self.options.items()),
             self.error,
+            self.greatest,
             self.median / simulated,
             min(self.cpu) / simulated,
             max(self.cpu) / simulated,
@@ -85,10 +87,10 @@ class Setting:
 
 
 def first_run(setting: Setting, case: Case) -> None:
-    """Set the error of a setting, infinite if a scene diverges, and its first time."""
+    """Set the errors of a setting, infinite if a scene diverges, and its first time."""
     stride = 1 if case.every is None else round(case.every / setting.dt)
     frames = round(case.duration / setting.dt) // stride
-    errors, cpu = [], 0.0
+    errors, greatest, cpu = [], [], 0.0
     for scene in case.scenes:
         engine = setting.load(scene, case.sleeping)
         poses = [engine.poses()]
@@ -102,8 +104,13 @@ def first_run(setting: Setting, case: Case) -> None:
             poses[-1] = np.full_like(poses[0], np.nan)
         times = np.arange(len(poses)) * stride * setting.dt
         finite = np.isfinite(poses).all()
-        errors.append(case.error(scene, times, np.array(poses)) if finite else np.inf)
+        seen = scene, times, np.array(poses)
+        errors.append(case.error(*seen) if finite else np.inf)
+        if case.greatest is not None:
+            greatest.append(case.greatest(*seen) if finite else np.inf)
     setting.error = case.total(errors)
+    if greatest:
+        setting.greatest = case.total(greatest)
     setting.cpu.append(cpu if cpu > LONG else stepping(setting, case))
 
 

@@ -198,7 +198,7 @@ def rockfall(count: int, seeds: int, must: float, aim: float) -> Case:
         deep,
         tuple(part for part in PARTS if LONGEST / part <= FRAME),
         3 if count < 480 else 2,  # the third takes minutes and is never the best
-        (0.05,),
+        (0.05, 0.02, 0.01, 0.005),
         must,
         aim,
         sleeping=True,
@@ -248,9 +248,9 @@ def all_cases() -> tuple[Case, ...]:
         standing("stack-10", assemblies.tower(rng(), 10)),
         standing("stack-30", assemblies.tower(rng(), 30)),
         standing("mass-1-100", assemblies.heavy_on_light(rng(), 100.0)),
-        rockfall(20, 5, 1.0, 0.5),
-        rockfall(120, 7, 0.75, 0.45),
-        rockfall(480, 3, 0.7, 0.35),
+        rockfall(20, 5, 0.6, 0.45),
+        rockfall(120, 7, 0.55, 0.4),
+        rockfall(480, 3, 0.5, 0.35),
     )
 
 

@@ -19,7 +19,7 @@ from rigdda.app.page.falls import ENDS, Fall, Release, shares
 from rigdda.app.page.forms import button, heading, in_words, legend, paragraph, table
 from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.replays import replay_arguments
-from rigdda.app.page.section import BORDER, Section, plain_axes
+from rigdda.app.page.section import BORDER, WIDEST, Section, plain_axes
 from rigdda.app.page.state import LAYOUT
 from rigdda.app.page.theme import SCALE, SERIES, TALL
 from rigdda.app.reports import simulation_report, stations
@@ -247,8 +247,8 @@ class FallsTab:
 
     def _small(self, title: str, x: str, y: str, x_range: Any) -> Any:
         """Return a small figure."""
-        plot = figure(height=SMALL, sizing_mode="stretch_width", tools="", title=title,
-                      min_border_left=BORDER,
+        plot = figure(height=SMALL, max_width=WIDEST, sizing_mode="stretch_width", tools="",
+                      title=title, min_border_left=BORDER,
                       x_axis_label=x, y_axis_label=y, toolbar_location=None, visible=False,
                       x_range=Range1d(0, 1) if x_range is None else x_range,
                       y_range=Range1d(0, 1))  # fmt: skip

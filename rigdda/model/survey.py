@@ -555,8 +555,19 @@ def _zeros(points: Floats) -> list[int]:
 def spikes(points: Floats) -> list[tuple[int, float]]:
     """Return the points that lie far above or below both neighbours, with the height above [m].
 
-    Such a point is often a typing error. Heights of pits are negative.
+    Such a point is often a typing error. Heights of pits are negative. A point that lies far off
+    only because of a neighbour that lies farther off is not among them.
     """
+    found: dict[int, float] = {}
+    left = list(range(len(points)))
+    while worst := max(_far_off(points[left]), key=lambda one: abs(one[1]), default=None):
+        place, height = worst
+        found[left.pop(place)] = height
+    return sorted(found.items())
+
+
+def _far_off(points: Floats) -> list[tuple[int, float]]:
+    """Return all points that lie far above or below both neighbours, with the height above [m]."""
     found = []
     for k in range(1, len(points) - 1):
         (x0, y0), (x, y), (x1, y1) = points[k - 1], points[k], points[k + 1]

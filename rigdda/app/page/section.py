@@ -130,6 +130,7 @@ class Section:
             plot.add_tools(
                 HoverTool(
                     renderers=[line], mode="vline", line_policy="prev", description="coordinates",
+                    attachment="above",
                     tooltips=[("chainage", "$x{0.00} metres"), ("elevation", "$y{0.00} metres"),
                               ("slope here", "@slope{0.0} degrees")],
                 )

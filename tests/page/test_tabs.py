@@ -53,6 +53,21 @@ def test_a_release_that_is_asked_for_before_the_tab_is_shown_is_not_lost(host):
     assert len(tab.section.ways.data["xs"]) == len(release.falls) == BATCH
 
 
+def test_a_click_near_a_path_replays_its_block(host):
+    tab = FallsTab(host)
+    tab.show()
+    tab._more()
+    tab._release.join()
+    tab.tick()
+    fall = tab._release.falls[7]
+    k = len(fall.x) // 2
+    tab._tapped(types.SimpleNamespace(x=fall.x[k], y=fall.y[k] + 1e-4))
+    assert tab._replaying.visible and tab._replayed is fall
+    assert f"{fall.event}, seed {fall.seed}: {fall.end}" in html.unescape(tab._rerun.object)
+    tab._tapped(types.SimpleNamespace(x=fall.x[k], y=fall.y.max() + 100.0))
+    assert tab._replayed is fall
+
+
 def test_a_new_layout_keeps_the_event_that_was_chosen(host):
     tab = FallsTab(host)
     tab.show()

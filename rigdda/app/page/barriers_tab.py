@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import math
+import re
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -59,17 +60,18 @@ class BarriersTab:
         self._structure: Any = None
         self._bound: list[Bound] = []
         self._palette = pn.FlexBox(sizing_mode="stretch_width")
+        self._paths = pn.pane.HTML("", margin=(0, 8))
         self._forms = pn.Column(sizing_mode="stretch_width")
-        self._figures = pn.pane.HTML("", width=WIDE - 20, margin=(0, 8))
+        self._figures = pn.pane.HTML("", width=WIDE - 40, margin=(0, 8))
         self._rules = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._command = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._kept: list[str] = []
-        self._compared = pn.pane.HTML("", width=WIDE - 30)
-        self._alternatives = pn.Column(width=WIDE - 20)
+        self._compared = pn.pane.HTML("", width=WIDE - 40)
+        self._alternatives = pn.Column(width=WIDE - 40)
         self._name = pn.widgets.TextInput(label="Name of an alternative", width=200)
         self.panel = pn.Row(
             pn.Column(
-                self._palette, pn.pane.HTML(legend(PATHS), margin=(0, 8)), self.section.plot,
+                self._palette, self._paths, self.section.plot,
                 self._rules, self._forms, self._command,
                 sizing_mode="stretch_width",
             ),
@@ -215,6 +217,7 @@ class BarriersTab:
         site = self.project.site
         single = [e.name for e in site.events if e.number == (1, 1) and site.source(e.source).band]
         event = (single or list(site.event_names))[0]
+        self._paths.object = f"{html.escape(event)}: {legend(PATHS)}"
         self._release = Release(site, self.project.layout, event)
         self._drawn = 0
         self.section.ways.data = {"xs": [], "ys": [], "colour": [], "words": []}
@@ -289,12 +292,22 @@ def ways(falls: list[Fall], colour: Callable[[Fall], str]) -> dict[str, list[Any
     }
 
 
+def _named(line: str, layout: Layout) -> str:
+    """Return a message in which barriers have the names of the forms, such as "2. ditch"."""
+
+    def name(found: re.Match[str]) -> str:
+        k = int(found[1])
+        return f"{k + 1}. {layout[k].words}, " if k < len(layout) else found[0]
+
+    return re.sub(r"layout\[(\d+)\]\.?(?=\w)", name, line)
+
+
 def _rules(found: LiveFigures, bad: str) -> str:
     """Return what forbids the layout, as a list."""
     lines = [*found.broken, *([found.fault] if found.fault else [])]
     if not lines:
         return ""
-    items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
+    items = "".join(f"<li>{html.escape(_named(line, found.layout))}</li>" for line in lines)
     return (
         f"<div role='alert' style='color:{bad}'><b>This layout may not be built:</b>"
         f"<ul style='margin:2px 0;padding-left:20px'>{items}</ul></div>"

@@ -522,7 +522,8 @@ class FallsTab:
         parts = ["rigdda", *self._replay_arguments(fall)]
         words = (
             f"{fall.event}, seed {fall.seed}: {fall.end}. A block of {fall.mass:.3g} tonnes, at "
-            f"most {fall.energy.max():,.0f} kilojoules and {fall.speed.max():.3g} metres per second."
+            f"most {fall.energy.max():,.0f} kilojoules and {fall.speed.max():.3g} metres per "
+            "second."
         )
         self._rerun.object = (
             f"{paragraph(words)}"

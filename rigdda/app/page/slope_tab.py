@@ -22,6 +22,7 @@ from rigdda.app.page.loading import IMPORTING
 from rigdda.app.page.locking import soon
 from rigdda.app.page.section import HandleSource, Section, ground_colour
 from rigdda.app.page.theme import TALL
+from rigdda.app.reports.wording import survey_grid
 from rigdda.app.value_origins import accepted
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import spikes
@@ -150,7 +151,7 @@ class SlopeTab:
         command = f"rigdda check {self.project.where.site}"
         quiet = f"color:{self.theme.quiet}"
         self._findings.object = (
-            f"<p style='margin:8px 0 0;{quiet}'>{html.escape(_grid(self.project.site))}</p>"
+            f"<p style='margin:8px 0 0;{quiet}'>{html.escape(survey_grid(self.project.site))}</p>"
             f"<h2 style='font-size:15px;margin:8px 0 2px'>{html.escape(head)}</h2>"
             f"<ul style='margin:2px 0;padding-left:20px'>{lines}</ul>"
             f"<p style='{quiet}'>The same, with a few releases: "
@@ -533,18 +534,6 @@ def _value(project: Any, path: Path_) -> Any:
             found[key] if isinstance(key, int) or isinstance(found, dict) else getattr(found, key)
         )
     return found
-
-
-def _grid(site: Site) -> str:
-    """Return in words how the chainages of the page follow from those of the survey."""
-    origin = site.origin
-    if not origin.surveyed:
-        return ""
-    sign = "less the chainage" if origin.reversed else "plus the chainage"
-    words = f"Chainage of the survey: {origin.chainage:,.10g} metres {sign} of the page."
-    if origin.elevation:
-        words += f" Elevation of the survey: {origin.elevation:,.10g} metres plus that of the page."
-    return words
 
 
 def _period(project: Any, i: int) -> float:

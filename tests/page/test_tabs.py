@@ -180,6 +180,21 @@ def test_forms_follow_what_is_added_and_removed_and_keep_the_other_rows(host):
         tab._add_stretch("meadow", None, 12.0)
 
 
+def test_only_results_that_are_complete_go_into_a_report(host):
+    from rigdda.agents.run_record import RunRecord, write_records
+    from rigdda.app.page.report_tab import ReportTab
+
+    for name, ended in (("fit-1", ""), ("study", "2026-11-30T00:47:12Z")):
+        record = RunRecord.begin(name[:5].strip("-1"), [], {}, None)
+        record.ended = ended
+        (host.project.folder / name).mkdir()
+        write_records(host.project.folder / name, {record.command: record})
+    tab = ReportTab(host)
+    tab.show()
+    assert tab._results.options == {"study: figures of the layout, 2026-11-30 00:47 UTC": "study"}
+    assert tab._results.value == ["study"]
+
+
 def test_results_of_a_layout_are_computed_in_a_relative_folder(tmp_path, monkeypatch):
     from rigdda.app.page.report_tab import ReportTab
 

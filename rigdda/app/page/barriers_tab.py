@@ -323,14 +323,19 @@ def shown(value: float) -> str:
 
 def alternatives_html(project: Project, live: Live) -> str:
     """Return the table that compares the alternatives of a project; empty without any."""
-    rows = []
+    rows, bare = [], None
     for name, layout in project.alternatives.items():
         words = "; ".join(b.label for b in layout) or "no barrier"
-        rows.append((name, words, *_compared(live.known(project.site, layout))))
+        found = live.known(project.site, layout)
+        rows.append((f"{name}: {words}", *_compared(found)))
+        bare = bare or (found and found.bare)
     if not rows:
         return ""
-    head = ("name", "barriers", "Z", "95 % interval", "to build", "most probable reach [%]",
-            "releases")  # fmt: skip
+    if bare:
+        ends = f"{shown(bare['objective_low'])} to {shown(bare['objective_high'])}"
+        rows.append(("without them", shown(bare["objective"]), ends, shown(bare["cost"]), "", ""))
+    head = ("alternative", "Z", "95 % interval", "to build",
+            "reaches the road, worst event [%]", "releases")  # fmt: skip
     caption = "Unverified; Z in EUR per metre of road and year, to build in EUR per metre"
     return table(head, rows, caption)
 
@@ -423,7 +428,7 @@ def _checks(found: LiveFigures, bad: str) -> str:
             )
         )
     out = table(("check", "use", "at most", ""), rows, "Use of each check")
-    out = out.replace("NOT MET", f"<b style='color:{bad}'>NOT MET</b>")
+    out = out.replace("NOT MET", f"<b style='color:{bad};white-space:nowrap'>NOT MET</b>")
     for line in found.checks.idle:
         out += paragraph(f"No block of the design events reaches the {line}.")
     return out

@@ -160,6 +160,19 @@ def _wait(done, seconds=120.0):
         time.sleep(0.02)
 
 
+def test_a_description_that_is_entered_is_that_of_the_site(host):
+    from panel.widgets import TextAreaInput
+
+    from rigdda.app.page.slope_tab import SlopeTab
+
+    tab = SlopeTab(host)
+    tab.show()
+    (area,) = [one for one in tab._forms if isinstance(one, TextAreaInput)]
+    assert area.value == host.project.site.description
+    area.value = 'Surveyed by A. B.; "talus" below\nthe cliff.'
+    assert host.project.site.description == area.value
+
+
 def test_forms_follow_what_is_added_and_removed_and_keep_the_other_rows(host):
     from rigdda.app.page.slope_tab import SlopeTab
 

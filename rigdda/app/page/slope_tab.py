@@ -213,12 +213,30 @@ class SlopeTab:
             from_ = place if sized else None
             yield ("event", i, sources, from_), partial(self._event, i, sources, from_)
         yield ("new event",), lambda: [button("Add an event", self._add_event)]
+        yield ("description",), self._description
         yield (
             ("import",),
             lambda: [
                 pn.Card(self._import, title="Import a survey", collapsed=True, width=WIDE - 30)
             ],
         )
+
+    def _description(self) -> list[Any]:
+        """Return the inputs for the name and the description of the site."""
+        name = Bound(
+            pn.widgets.TextInput(label="Name of the site", width=340, margin=(2, 8)),
+            partial(_value, self.project, ("name",)), self._set(("name",), "the name of the site"),
+        )  # fmt: skip
+        words = Bound(
+            pn.widgets.TextAreaInput(
+                label="What is known of the slope, and by whom; it begins the report", width=380,
+                height=90, margin=(2, 8),
+            ),
+            partial(_value, self.project, ("description",)),
+            self._set(("description",), "the description of the site"),
+        )  # fmt: skip
+        self._bound += [name, words]
+        return [heading("Description"), name.widget, words.widget]
 
     def _outlier(self, site: Site, k: int, height: float) -> list[Any]:
         """Return how an outlier of the survey is mended."""

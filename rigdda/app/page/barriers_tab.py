@@ -293,11 +293,11 @@ def ways(falls: list[Fall], colour: Callable[[Fall], str]) -> dict[str, list[Any
 
 
 def _named(line: str, layout: Layout) -> str:
-    """Return a message in which barriers have the names of the forms, such as "2. ditch"."""
+    """Return a message in which barriers have the names of their handles, such as "ditch 2"."""
 
     def name(found: re.Match[str]) -> str:
         k = int(found[1])
-        return f"{k + 1}. {layout[k].words}, " if k < len(layout) else found[0]
+        return f"{layout[k].words} {k + 1}, " if k < len(layout) else found[0]
 
     return re.sub(r"layout\[(\d+)\]\.?(?=\w)", name, line)
 

@@ -217,7 +217,7 @@ class DecideTab:
         command = f"<code>{html.escape(job.command)}</code>" if job.command else ""
         self._status.object = (
             f"<p role='status' style='margin:2px 0'>{html.escape(told)} "
-            f"{done:,} releases and {len(found):,} layouts so far.</p>{command}"
+            f"{done:,} releases, {len(found):,} layouts.</p>{command}"
         )
         self._bar.visible = state == RUNNING
         most = 1.5 * float(self.job.option("--budget") or BUDGET)

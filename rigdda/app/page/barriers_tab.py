@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -323,12 +323,14 @@ def shown(value: float) -> str:
 
 def alternatives_html(project: Project, live: Live) -> str:
     """Return the table that compares the alternatives of a project; empty without any."""
-    rows, bare = [], None
+    rows: list[tuple[str, ...]] = []
+    bare: Mapping[str, Any] | None = None
     for name, layout in project.alternatives.items():
         words = "; ".join(b.label for b in layout) or "no barrier"
         found = live.known(project.site, layout)
         rows.append((f"{name}: {words}", *_compared(found)))
-        bare = bare or (found and found.bare)
+        if found is not None:
+            bare = bare or found.bare
     if not rows:
         return ""
     if bare:

@@ -18,7 +18,7 @@ from rigdda import BadInput, Site
 from rigdda.app import new_site
 from rigdda.app.new_site import SiteRequest, compose
 from rigdda.ground.grounds import GROUNDS
-from rigdda.model.survey import Survey, parse_table, profile_of, read_survey
+from rigdda.model.survey import Survey, parse_table, profile_of, read_survey, spikes
 from rigdda.sites.schema import schema
 
 TALUS = ((0.0, 92.0), (10.0, 90.0), (22.0, 60.0), (72.0, 20.0), (94.0, 6.0), (104.0, 4.5),
@@ -187,6 +187,15 @@ def test_grounds_sources_and_zone_are_where_they_were_given(tmp_path):
                      (115.0, "asphalt"), (140.0, "weathered_rock")]  # fmt: skip
     assert site.surfaces["talus"].friction_deg == GROUNDS["coarse_talus"].friction_deg.typical
     assert site.realise(seed=3).blocks
+
+
+def test_a_point_beside_an_outlier_is_not_doubtful():
+    points = np.array([(0.0, 40.0), (10.0, 30.0), (18.0, 24.0), (22.0, 41.0), (26.0, 18.0),
+                       (40.0, 10.0)])  # fmt: skip
+    assert spikes(points) == [(3, pytest.approx(17.0))]  # and not point 2, below both neighbours
+    points[4, 1] = 8.0
+    points[5] = (40.0, 25.0)
+    assert [k for k, _ in spikes(points)] == [3, 4]
 
 
 def test_each_value_is_commented_with_its_unit_and_how_sure_it_is(tmp_path):

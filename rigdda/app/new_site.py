@@ -14,6 +14,7 @@ import tomli_w
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Site
+from rigdda.app.value_origins import CHECK_DEFAULT, GIVEN, PLACEHOLDER, SURVEYED
 from rigdda.fields import described
 from rigdda.files import atomic
 from rigdda.ground.barrier_zone import BarrierZone
@@ -41,12 +42,6 @@ from rigdda.model.traffic import Traffic
 
 Floats = NDArray[np.float64]
 Span = tuple[float, float]
-
-SURVEYED = "surveyed"
-GIVEN = "given"
-PLACEHOLDER = "placeholder: replace"
-CHECK_DEFAULT = "default: check"
-"""Origins of values, as the comments in the file give them."""
 
 SLOPE_DEG, FACE_DEG = 25.0, 40.0
 """Inclination of the ground above which it is slope rather than its foot, and a face [deg]."""
@@ -726,12 +721,6 @@ def _table(part: Part) -> Iterator[str]:
         yield f"# {_first_sentence(field.text).rstrip('.')}{unit}; {sure}."
         yield f"{key} = {_toml(value)}"
     yield from (f"# {line}" for line in part.comments)
-
-
-def placeholders(text: str) -> int:
-    """Return how many values of a site file are marked as placeholders, without its templates."""
-    lines = (line for line in text.splitlines() if re.match(r"#(?!\s*#)", line))
-    return sum(line.endswith(f"{PLACEHOLDER}.") for line in lines)
 
 
 def _first_sentence(text: str) -> str:

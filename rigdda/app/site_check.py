@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rigdda import Event, Site, Source, seeds
-from rigdda.app import new_site
+from rigdda.app import value_origins
 from rigdda.app.reports.tables import empty_table
 from rigdda.app.reports.wording import surveyed
 from rigdda.barriers.fence import FENCE_CLASSES
@@ -108,12 +108,12 @@ def _standing(site: Site) -> Iterator[str]:
         )
 
 
-def placeholders(path: str) -> int:
-    """Return how many values a file of `rigdda new` still marks as placeholders; 0 of a name."""
+def placeholders(path: str) -> list[str]:
+    """Return the values that a file of `rigdda new` still marks as placeholders; none of a name."""
     file = Path(path)
     if not file.is_file():
-        return 0
-    return new_site.placeholders(file.read_text(encoding="utf-8", errors="replace"))
+        return []
+    return value_origins.placeholders(file.read_text(encoding="utf-8", errors="replace"))
 
 
 def _origin(site: Site) -> Iterator[str]:

@@ -477,7 +477,7 @@ def _odd_band(site: Site, source: Source) -> Iterator[str]:
 
 def _angles(angles: Sequence[float]) -> str:
     """Return the least and the greatest of some angles [deg], in words."""
-    low, high = f"{min(angles):.0f}", f"{max(angles):.0f}"
+    low, high = (f"{angle:.1f}".removesuffix(".0") for angle in (min(angles), max(angles)))
     return low if low == high else f"{low} to {high}"
 
 

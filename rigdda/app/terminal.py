@@ -480,8 +480,8 @@ def warn_of_placeholders(site: str) -> None:
     """Print a note if a site file still has placeholders of `rigdda new`."""
     from rigdda.app import site_check
 
-    if count := site_check.placeholders(site):
-        note(f"the site file marks {count} values as placeholders to replace")
+    if left := site_check.placeholders(site):
+        note(f"the site file marks {len(left)} values as placeholders to replace")
 
 
 TRAFFIC_HEADING = (

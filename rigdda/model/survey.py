@@ -85,6 +85,9 @@ SPIKE, OUTLIER = 3.0, 0.3
 """Height over both neighbours [m] from which a point is doubted, and the least slope down to each
 of them [-]."""
 
+WORSE = 2.0
+"""Quotient of the heights over their neighbours from which on one of two points is to blame."""
+
 DIGITS = 6
 """Decimals of the coordinates of a site in metres: subtraction leaves noise in later ones."""
 
@@ -555,8 +558,25 @@ def _zeros(points: Floats) -> list[int]:
 def spikes(points: Floats) -> list[tuple[int, float]]:
     """Return the points that lie far above or below both neighbours, with the height above [m].
 
-    Such a point is often a typing error. Heights of pits are negative.
+    Such a point is often a typing error. Heights of pits are negative. A point that lies far off
+    only because of a neighbour that lies much farther off is not among them.
     """
+    found = dict(_far_off(points))
+    return [(k, up) for k, up in found.items() if not _misled(points, found, k)]
+
+
+def _misled(points: Floats, found: dict[int, float], k: int) -> bool:
+    """Return whether point `k` of those found is no longer far off without a worse neighbour."""
+    for near in (k - 1, k + 1):
+        if abs(found.get(near, 0.0)) > WORSE * abs(found[k]):
+            rest = dict(_far_off(np.delete(points, near, axis=0)))
+            if k - (near < k) not in rest:
+                return True
+    return False
+
+
+def _far_off(points: Floats) -> list[tuple[int, float]]:
+    """Return all points that lie far above or below both neighbours, with the height above [m]."""
     found = []
     for k in range(1, len(points) - 1):
         (x0, y0), (x, y), (x1, y1) = points[k - 1], points[k], points[k + 1]

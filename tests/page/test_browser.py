@@ -35,8 +35,8 @@ SURVEY = """chainage,elevation
 TABS = ("Slope", "Falls", "Ground", "Barriers", "Decide", "Report")
 
 
-def _drag(tab, title, words, change, done):
-    """Drag a handle until something is done; a busy browser may miss the first attempt."""
+def _drag(tab, title, words, change, done, still=0.0):
+    """Drag a handle until something is done, after it was held still for a while [s]."""
     for _ in range(5):
         x, y = tab.wait_for_function(HANDLE, arg=words, timeout=30_000).json_value()
         a = tab.wait_for_function(PLACE, arg=[title, x, y]).json_value()
@@ -44,6 +44,7 @@ def _drag(tab, title, words, change, done):
         tab.mouse.move(*a)
         tab.wait_for_timeout(100)
         tab.mouse.down()
+        tab.wait_for_timeout(1e3 * still)
         tab.mouse.move((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, steps=4)
         tab.mouse.move(*b, steps=4)
         tab.mouse.up()
@@ -172,6 +173,11 @@ def test_from_a_survey_to_a_search_that_survives_its_server(serve, chromium, tab
     tab.get_by_text("Nothing is released yet.").wait_for()
     tab.get_by_role("button", name="Release 200").click()
     tab.get_by_text("200 of 200 releases").wait_for()
+    collector = tab.get_by_label("Collector at chainage")
+    before = float(collector.input_value())
+    _drag(tab, "Releases; a click on a path replays it", "collector", (-5.0, 0.0),
+          lambda: float(collector.input_value()) != before, still=0.6)  # fmt: skip
+    assert float(collector.input_value()) == pytest.approx(before - 5.0, abs=0.6)
     other = chromium.new_page(viewport={"width": 1280, "height": 720})
     other.goto(server.address)
     open_tab(other, "Barriers")

@@ -1,5 +1,6 @@
 """Observations of a project, how well a site matches them, and the arguments of the fit."""
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -37,6 +38,14 @@ def test_files_are_kept_if_they_can_be_read(tmp_path, verge):
             ground.keep(tmp_path, name, content.encode(), verge)
     assert [path.name for path in ground.files(tmp_path)] == ["marks.csv", "run outs.csv"]
     assert (tmp_path / "observed" / "marks.csv").read_text() == MARKS
+
+
+def test_chainages_of_the_survey_are_refused_with_those_of_the_page(tmp_path, verge):
+    origin = msgspec.structs.replace(verge.origin, chainage=1200.0)
+    site = msgspec.structs.replace(verge, origin=origin)
+    runs = "event,run_out_m\nblock,1209.8\n"
+    with pytest.raises(BadInput, match="Chainage in the survey: 1,200 metres plus the chainage"):
+        ground.keep(tmp_path, "runs.csv", runs.encode(), site)
 
 
 def test_the_score_is_that_of_the_fit(tmp_path, verge):

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from rigdda import BadInput, Ditch, Fence, Site, load_layout, sites
 from rigdda.app.page import edits
 from rigdda.app.page.state import Conflict, Place, Project, place
+from rigdda.app.value_origins import accepted, placeholders
 
 QUICK = sites.text("quick")
 
@@ -108,6 +109,29 @@ def test_an_edit_keeps_comments_and_changes_only_its_value(tmp_path):
     was, now = tomllib.loads(text), tomllib.loads(new)
     was["road"]["end"] = 45.0
     assert was == now
+
+
+def test_a_value_that_is_set_is_no_placeholder_any_more():
+    marked = QUICK.replace("[road]\n", "[road]\n# Uphill edge; placeholder: replace.\n", 1)
+    marked = marked.replace("name =", "# Name; placeholder: replace.\nname =", 1)
+    marked += "\n# [[forest]]\n# # Where it begins; placeholder: replace.\n# start = 4.0\n"
+    assert placeholders(marked) == ["name", "road.start"]
+    moved = edits.with_value(marked, ("road", "start"), 34.0)
+    assert placeholders(moved) == ["name"]
+    assert "# Uphill edge; given.\n" in moved
+    assert placeholders(accepted(marked)) == []
+    assert accepted(marked).count("placeholder") == 1  # of the table that is not used
+
+
+def test_the_comment_of_a_band_follows_its_ends_and_goes_with_its_key():
+    text = (
+        "[[sources]]\n# Band; placeholder: replace.\nband = [1.0, 2.0]\n"
+        "# Length; placeholder: replace.\nlength = 3.0\n"
+    )
+    moved = edits.with_value(text, ("sources", 0, "band", 1), 4.0)
+    assert "# Band; given.\nband = [1.0, 4.0]" in moved
+    assert placeholders(moved) == ["sources.length"]
+    assert edits.with_value(text, ("sources", 0, "length"), None) == text[: text.index("# Length")]
 
 
 def test_a_change_by_another_program_is_read_and_never_overwritten(tmp_path):

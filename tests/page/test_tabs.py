@@ -53,6 +53,21 @@ def test_a_release_that_is_asked_for_before_the_tab_is_shown_is_not_lost(host):
     assert len(tab.section.ways.data["xs"]) == len(release.falls) == BATCH
 
 
+def test_a_click_near_a_path_replays_its_block(host):
+    tab = FallsTab(host)
+    tab.show()
+    tab._more()
+    tab._release.join()
+    tab.tick()
+    fall = tab._release.falls[7]
+    k = len(fall.x) // 2
+    tab._tapped(types.SimpleNamespace(x=fall.x[k], y=fall.y[k] + 1e-4))
+    assert tab._replaying.visible and tab._replayed is fall
+    assert f"{fall.event}, seed {fall.seed}: {fall.end}" in html.unescape(tab._rerun.object)
+    tab._tapped(types.SimpleNamespace(x=fall.x[k], y=fall.y.max() + 100.0))
+    assert tab._replayed is fall
+
+
 def test_a_new_layout_keeps_the_event_that_was_chosen(host):
     tab = FallsTab(host)
     tab.show()
@@ -145,6 +160,19 @@ def _wait(done, seconds=120.0):
         time.sleep(0.02)
 
 
+def test_a_description_that_is_entered_is_that_of_the_site(host):
+    from panel.widgets import TextAreaInput
+
+    from rigdda.app.page.slope_tab import SlopeTab
+
+    tab = SlopeTab(host)
+    tab.show()
+    (area,) = [one for one in tab._forms if isinstance(one, TextAreaInput)]
+    assert area.value == host.project.site.description
+    area.value = 'Surveyed by A. B.; "talus" below\nthe cliff.'
+    assert host.project.site.description == area.value
+
+
 def test_forms_follow_what_is_added_and_removed_and_keep_the_other_rows(host):
     from rigdda.app.page.slope_tab import SlopeTab
 
@@ -163,6 +191,21 @@ def test_forms_follow_what_is_added_and_removed_and_keep_the_other_rows(host):
     assert names == list(host.project.site.event_names)
     with pytest.raises(BadInput, match="new stretch"):
         tab._add_stretch("meadow", None, 12.0)
+
+
+def test_only_results_that_are_complete_go_into_a_report(host):
+    from rigdda.agents.run_record import RunRecord, write_records
+    from rigdda.app.page.report_tab import ReportTab
+
+    for name, ended in (("fit-1", ""), ("study", "2026-11-30T00:47:12Z")):
+        record = RunRecord.begin(name[:5].strip("-1"), [], {}, None)
+        record.ended = ended
+        (host.project.folder / name).mkdir()
+        write_records(host.project.folder / name, {record.command: record})
+    tab = ReportTab(host)
+    tab.show()
+    assert tab._results.options == {"study: figures of the layout, 2026-11-30 00:47 UTC": "study"}
+    assert tab._results.value == ["study"]
 
 
 def test_results_of_a_layout_are_computed_in_a_relative_folder(tmp_path, monkeypatch):

@@ -57,7 +57,7 @@ def new(
     subtracted and stored in the file. The comment on each value says whether it was surveyed or
     given, or is a placeholder to replace.
     """
-    from rigdda.app import new_site
+    from rigdda.app import new_site, value_origins
 
     request = new_site.SiteRequest(road or None, toe, zone or None, grounds, sources, masses, layer)
     file = new_site.file_of(name, out)
@@ -65,7 +65,7 @@ def new(
     new_site.write(file, text)
     for words in found.notes:
         note(words)
-    count = counted(new_site.placeholders(text), "placeholder")
+    count = counted(len(value_origins.placeholders(text)), "placeholder")
     click.echo(
         f"{len(found.points)} points; {file} is written, with {count} to replace. "
         f"To draw and check it: rigdda check {file}"

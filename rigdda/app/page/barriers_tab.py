@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -59,17 +60,18 @@ class BarriersTab:
         self._structure: Any = None
         self._bound: list[Bound] = []
         self._palette = pn.FlexBox(sizing_mode="stretch_width")
+        self._paths = pn.pane.HTML("", margin=(0, 8))
         self._forms = pn.Column(sizing_mode="stretch_width")
-        self._figures = pn.pane.HTML("", width=WIDE - 20, margin=(0, 8))
+        self._figures = pn.pane.HTML("", width=WIDE - 40, margin=(0, 8))
         self._rules = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._command = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._kept: list[str] = []
-        self._compared = pn.pane.HTML("", width=WIDE - 30)
-        self._alternatives = pn.Column(width=WIDE - 20)
+        self._compared = pn.pane.HTML("", width=WIDE - 40)
+        self._alternatives = pn.Column(width=WIDE - 40)
         self._name = pn.widgets.TextInput(label="Name of an alternative", width=200)
         self.panel = pn.Row(
             pn.Column(
-                self._palette, pn.pane.HTML(legend(PATHS), margin=(0, 8)), self.section.plot,
+                self._palette, self._paths, self.section.plot,
                 self._rules, self._forms, self._command,
                 sizing_mode="stretch_width",
             ),
@@ -215,6 +217,7 @@ class BarriersTab:
         site = self.project.site
         single = [e.name for e in site.events if e.number == (1, 1) and site.source(e.source).band]
         event = (single or list(site.event_names))[0]
+        self._paths.object = f"{html.escape(event)}: {legend(PATHS)}"
         self._release = Release(site, self.project.layout, event)
         self._drawn = 0
         self.section.ways.data = {"xs": [], "ys": [], "colour": [], "words": []}
@@ -289,12 +292,22 @@ def ways(falls: list[Fall], colour: Callable[[Fall], str]) -> dict[str, list[Any
     }
 
 
+def _named(line: str, layout: Layout) -> str:
+    """Return a message in which barriers have the names of their handles, such as "ditch 2"."""
+
+    def name(found: re.Match[str]) -> str:
+        k = int(found[1])
+        return f"{layout[k].words} {k + 1}, " if k < len(layout) else found[0]
+
+    return re.sub(r"layout\[(\d+)\]\.?(?=\w)", name, line)
+
+
 def _rules(found: LiveFigures, bad: str) -> str:
     """Return what forbids the layout, as a list."""
     lines = [*found.broken, *([found.fault] if found.fault else [])]
     if not lines:
         return ""
-    items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
+    items = "".join(f"<li>{html.escape(_named(line, found.layout))}</li>" for line in lines)
     return (
         f"<div role='alert' style='color:{bad}'><b>This layout may not be built:</b>"
         f"<ul style='margin:2px 0;padding-left:20px'>{items}</ul></div>"
@@ -310,14 +323,21 @@ def shown(value: float) -> str:
 
 def alternatives_html(project: Project, live: Live) -> str:
     """Return the table that compares the alternatives of a project; empty without any."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
+    bare: Mapping[str, Any] | None = None
     for name, layout in project.alternatives.items():
         words = "; ".join(b.label for b in layout) or "no barrier"
-        rows.append((name, words, *_compared(live.known(project.site, layout))))
+        found = live.known(project.site, layout)
+        rows.append((f"{name}: {words}", *_compared(found)))
+        if found is not None:
+            bare = bare or found.bare
     if not rows:
         return ""
-    head = ("name", "barriers", "Z", "95 % interval", "to build", "most probable reach [%]",
-            "releases")  # fmt: skip
+    if bare:
+        ends = f"{shown(bare['objective_low'])} to {shown(bare['objective_high'])}"
+        rows.append(("without them", shown(bare["objective"]), ends, shown(bare["cost"]), "", ""))
+    head = ("alternative", "Z", "95 % interval", "to build",
+            "reaches the road, worst event [%]", "releases")  # fmt: skip
     caption = "Unverified; Z in EUR per metre of road and year, to build in EUR per metre"
     return table(head, rows, caption)
 
@@ -410,7 +430,7 @@ def _checks(found: LiveFigures, bad: str) -> str:
             )
         )
     out = table(("check", "use", "at most", ""), rows, "Use of each check")
-    out = out.replace("NOT MET", f"<b style='color:{bad}'>NOT MET</b>")
+    out = out.replace("NOT MET", f"<b style='color:{bad};white-space:nowrap'>NOT MET</b>")
     for line in found.checks.idle:
         out += paragraph(f"No block of the design events reaches the {line}.")
     return out

@@ -210,7 +210,9 @@ class DecideTab:
         folder = self.page.workspace.design_folder
         found = tried(folder) if folder is not None else []
         words = {"": "No search has been started.", FAILED: f"The search failed: {job.words}"}
-        told = words.get(state, f"The search is {state}. {job.line if state == RUNNING else ''}")
+        told = words.get(state, f"The search is {state}.")
+        if state == RUNNING and job.line:
+            told += f" {job.line.rstrip('.')}."
         done = max((one.simulations for one in found), default=0)
         command = f"<code>{html.escape(job.command)}</code>" if job.command else ""
         self._status.object = (

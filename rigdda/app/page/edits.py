@@ -7,8 +7,10 @@ from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import Comment, Null, Table
 
 from rigdda import BadInput
+from rigdda.app.value_origins import given
 
 Path = Sequence[str | int]
 """Keys of tables and places in lists that lead to a value, such as ("sources", 0, "band")."""
@@ -24,6 +26,8 @@ def dotted(path: Path) -> str:
 
 def with_value(text: str, path: Path, value: Any) -> str:
     """Return the text of a TOML file with another value at a path.
+
+    A comment that marks the value as a placeholder then says that it is given.
 
     Parameters
     ----------
@@ -66,6 +70,7 @@ def with_table(text: str, name: str, values: Mapping[str, Any]) -> str:
         raise BadInput(name, type(tables).__name__, "make it a list of tables, [[...]]")
     table = tomlkit.table()
     table.update(values)
+    table.add(tomlkit.nl())
     tables.append(table)
     return tomlkit.dumps(document)
 
@@ -114,13 +119,35 @@ def _set(document: Any, path: Path, value: Any) -> None:
                 parent[key] = tomlkit.table()
     parent, key = _inner(document, path, path[:-1]), path[-1]
     if value is None:
-        if isinstance(key, str):
-            parent.pop(key, None)
+        if isinstance(key, str) and key in parent:
+            _mark(document, path, remove=True)
+            del parent[key]
         return
     try:
         parent[key] = value
     except (IndexError, KeyError, TypeError, TOMLKitError):
         raise BadInput(dotted(path), value, "name a place that the file has") from None
+    _mark(document, path)
+
+
+def _mark(document: Any, path: Path, remove: bool = False) -> None:
+    """Let the comment in front of a value say that it is given, or remove the comment.
+
+    The comment is that of the innermost key of `path` that is in a line of its own.
+    """
+    parent, table, name = document, document, path[0]
+    for end, key in enumerate(path[1:], start=1):
+        parent = parent[path[end - 1]]
+        if isinstance(parent, Table):
+            table, name = parent, key
+    body = (table.value if isinstance(table, Table) else table).body
+    places = [k for k, (key, _) in enumerate(body) if key is not None and key.key == name]
+    if not places or not places[0] or not isinstance(comment := body[places[0] - 1][1], Comment):
+        return
+    if remove:
+        body[places[0] - 1] = (None, Null())
+    else:
+        comment.trivia.comment = given(comment.trivia.comment)
 
 
 def _inner(document: Any, path: Path, part: Path) -> Any:

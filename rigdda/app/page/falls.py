@@ -72,6 +72,11 @@ class Fall:
         return 1e-3 * self.found.energy[self.found.points(self.path)]
 
     @property
+    def mass(self) -> float:
+        """Mass of the block [t]."""
+        return 1e-3 * float(self.found.mass[self.path])
+
+    @property
     def duration(self) -> float:
         """Time at the end [s]."""
         return float(self.found.time[self.found.points(self.path)][-1])
@@ -116,6 +121,26 @@ def shares(falls: Sequence[Fall]) -> dict[str, Estimate]:
     """Return the share of blocks with each end, with its interval."""
     ends = [fall.end for fall in falls]
     return {end: estimate(ends.count(end), len(ends)) for end in ENDS.values()}
+
+
+def nearest(falls: Sequence[Fall], x: float, y: float, reach: float) -> Fall | None:
+    """Return the fall with the nearest path; None if all are farther than `reach` [m]."""
+    found = None
+    for fall in falls:
+        distance = _distance(fall, x, y)
+        if distance <= reach:
+            found, reach = fall, distance
+    return found
+
+
+def _distance(fall: Fall, x: float, y: float) -> float:
+    """Return the least distance of a place from the path of a block [m]."""
+    points = np.column_stack([fall.x, fall.y])
+    start, along = points[:-1], np.diff(points, axis=0)
+    square = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
+    share = np.clip(((np.array([x, y]) - start) * along).sum(axis=1) / square, 0.0, 1.0)
+    feet = np.vstack([points[:1], start + share[:, None] * along])
+    return float(np.hypot(feet[:, 0] - x, feet[:, 1] - y).min())
 
 
 class Release:

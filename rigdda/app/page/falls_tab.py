@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import panel as pn
-from bokeh.models import ColumnDataSource, HoverTool, PointDrawTool, Range1d, TapTool
+from bokeh.events import Tap
+from bokeh.models import ColumnDataSource, HoverTool, LinearAxis, PointDrawTool, Range1d
 from bokeh.plotting import figure
 
 from rigdda import Error
 from rigdda.app.page.barriers_tab import shown, ways
-from rigdda.app.page.falls import ENDS, Fall, Release, shares
+from rigdda.app.page.falls import ENDS, Fall, Release, nearest, shares
 from rigdda.app.page.forms import button, heading, in_words, legend, paragraph, table
-from rigdda.app.page.locking import on_change, watch
+from rigdda.app.page.locking import holding, on_change, watch
 from rigdda.app.page.replays import replay_arguments
-from rigdda.app.page.section import BORDER, Section, plain_axes
+from rigdda.app.page.section import BORDER, WIDEST, Section, plain_axes
 from rigdda.app.page.state import LAYOUT
 from rigdda.app.page.theme import SCALE, SERIES, TALL
 from rigdda.app.reports import simulation_report, stations
@@ -51,6 +52,12 @@ COLLECTED = ("energy", "velocity", "height", "height_normal")
 
 BINS = 24
 """Number of intervals of the histogram."""
+
+HEAD = 1.08
+"""Quotient of the top of an axis and the greatest value that it shows."""
+
+REACH = 0.015
+"""Distance from a click in which a path is found, as a share of the width of the figure."""
 
 
 class Passed:
@@ -123,11 +130,11 @@ class FallsTab:
         self._stop = button("Stop", self._end, margin=(18, 8))
         self._status = pn.pane.HTML("", margin=(22, 8), width=300)
         self._legend = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
-        self._shares = pn.pane.HTML("", width=WIDE - 20)
-        self._collector = pn.pane.HTML("", width=WIDE - 20)
-        self._station = pn.widgets.FloatInput(label="Collector at chainage [metres]", width=190)
+        self._shares = pn.pane.HTML("", width=WIDE - 40)
+        self._collector = pn.pane.HTML("", width=WIDE - 40)
+        self._station = pn.widgets.FloatInput(label="Collector at chainage [metres]", width=185)
         labels = {in_words(QUANTITIES[q].words, QUANTITIES[q].unit): q for q in COLLECTED}
-        self._what = pn.widgets.Select(label="Quantity", options=labels, width=190)
+        self._what = pn.widgets.Select(label="Quantity", options=labels, width=185)
         self._command = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._envelope = ColumnDataSource({"x": [], "energy": [], "height": []})
         self._bars = ColumnDataSource({"left": [], "right": [], "top": []})
@@ -137,7 +144,11 @@ class FallsTab:
         self._hits = ColumnDataSource({"x": [], "y": []})
         self._track = ColumnDataSource({"x": [], "energy": [], "height": []})
         self._time = pn.widgets.FloatSlider(
-            label="Time of the replay [seconds]", start=0.0, end=1.0, step=0.02
+            label="Time of the replay [seconds]",
+            start=0.0,
+            end=1.0,
+            step=0.02,
+            width=280,
         )
         self._play = pn.widgets.Toggle(label="Play", width=80, margin=(12, 8))
         self._rerun = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
@@ -216,13 +227,13 @@ class FallsTab:
         drag = PointDrawTool(renderers=[grip], add=False, description="drag the collector")
         plot.add_tools(
             drag,
-            TapTool(renderers=[self.section.ways_renderer], description="replay a way"),
             HoverTool(renderers=[self.section.ways_renderer], tooltips=[("", "@words")],
                       description="names of the paths"),
         )  # fmt: skip
         plot.toolbar.active_drag = drag
         on_change(self._line, "data", self._dragged)
-        on_change(self.section.ways.selected, "indices", self._picked)
+        # a tool for taps would disable the tool that drags the collector, which takes taps, too
+        plot.on_event(Tap, lambda event: holding(partial(self._tapped, event)))
         self._envelopes = self._small(
             "95 % of passing blocks are below", "", "energy [kJ]", plot.x_range
         )  # fmt: skip
@@ -237,23 +248,39 @@ class FallsTab:
         self._histogram = self._small("Blocks that pass the collector", "value", "blocks", None)
         self._histogram.quad(left="left", right="right", top="top", bottom=0, source=self._bars,
                              fill_color=SERIES[0], line_color=theme.paper)  # fmt: skip
-        self._histogram.line("x", "y", source=self._curve, line_color=SERIES[1], line_width=2)
+        self._beside(self._histogram, "share", "share below [%]").end = 100.0 * HEAD
+        self._histogram.line("x", "y", source=self._curve, line_color=SERIES[1], line_width=2,
+                             y_range_name="share")  # fmt: skip
         self._tracks = self._small(
-            "Energy of the block of the replay", "chainage [metres]", "energy [kilojoules]", None
-        )
+            "Energy, and height of the centre above ground (dashed)", "chainage [metres]",
+            "energy [kJ]", None,
+        )  # fmt: skip
         self._tracks.line("x", "energy", source=self._track, line_color=SERIES[0], line_width=2)
+        self._above = self._beside(self._tracks, "height", "height [m]")
         self._tracks.line("x", "height", source=self._track, line_color=SERIES[1], line_width=2,
-                          line_dash="4 2")  # fmt: skip
+                          line_dash="4 2", y_range_name="height")  # fmt: skip
+
+    def _beside(self, plot: Any, name: str, label: str) -> Range1d:
+        """Give a figure a second vertical axis, in the colour of its line, and return its range."""
+        found = Range1d(0, 1)
+        plot.extra_y_ranges[name] = found
+        axis = LinearAxis(y_range_name=name, axis_label=label)
+        plot.add_layout(axis, "right")
+        plain_axes(plot, self.theme)
+        axis.axis_label_text_color = SERIES[1]
+        axis.ticker.desired_num_ticks = 4
+        return found
 
     def _small(self, title: str, x: str, y: str, x_range: Any) -> Any:
         """Return a small figure."""
-        plot = figure(height=SMALL, sizing_mode="stretch_width", tools="", title=title,
-                      min_border_left=BORDER,
+        plot = figure(height=SMALL, max_width=WIDEST, sizing_mode="stretch_width", tools="",
+                      title=title, min_border_left=BORDER,
                       x_axis_label=x, y_axis_label=y, toolbar_location=None, visible=False,
                       x_range=Range1d(0, 1) if x_range is None else x_range,
                       y_range=Range1d(0, 1))  # fmt: skip
         plot.title.text_color = self.theme.text
         plot.title.text_font_style = "normal"
+        plot.yaxis.ticker.desired_num_ticks = 4
         plain_axes(plot, self.theme)
         return plot
 
@@ -325,6 +352,7 @@ class FallsTab:
             float(self._station.value),
         )  # fmt: skip
         self.page.workspace.workers.add(self._passed)
+        self._collector.object = paragraph("What passes the collector is being computed.")
         self._show_command(release.done)
 
     def _show_command(self, count: int) -> None:
@@ -421,7 +449,7 @@ class FallsTab:
         if len(values):
             counts, edges = np.histogram(values, BINS)
             self._bars.data = {"left": edges[:-1], "right": edges[1:], "top": counts}
-            share = np.arange(1, len(values) + 1) / len(values) * counts.max()
+            share = 100.0 * np.arange(1, len(values) + 1) / len(values)
             self._curve.data = {"x": values, "y": share}
             _fit(self._histogram, edges, counts)
         self._histogram.visible = bool(len(values))
@@ -431,8 +459,7 @@ class FallsTab:
             for words, q in (("mean", "mean"), ("half are below", "q50"), ("95 % below", "q95"),
                              ("99 % below", "q99"))
         ]  # fmt: skip
-        caption = f"{row['n']:,} blocks of {row['releases']:,} releases pass; the curve is their "
-        caption += "cumulative share"
+        caption = f"{row['n']:,} blocks of {row['releases']:,} releases pass the collector"
         self._collector.object = table((unit, "value", "95 % interval"), rows, caption)
 
     def _show_line(self) -> None:
@@ -457,12 +484,26 @@ class FallsTab:
             self._show_line()
             self._collect()
 
-    def _picked(self, new: list[int]) -> None:
+    def _tapped(self, event: Any) -> None:
         """Replay the release whose path was clicked."""
-        if not new or self._release is None or new[0] >= len(self._release.falls):
+        falls = self._release.falls[: self._drawn] if self._release else []
+        if event.x is None or event.y is None or not falls:
             return
-        fall = self._release.falls[new[0]]
-        self.page.act(partial(self._replay, fall))
+        fall = nearest(falls, float(event.x), float(event.y), REACH * self._width())
+        if fall is not None:
+            self.page.act(partial(self._replay, fall))
+
+    def _width(self) -> float:
+        """Return the length of slope that the figure shows [m]."""
+        shown_range = self.section.plot.x_range
+        points = self.project.site.slope.points
+        low, high = (
+            given if isinstance(given, int | float) and np.isfinite(given) else own
+            for given, own in (
+                (shown_range.start, points[0][0]), (shown_range.end, points[-1][0])
+            )
+        )  # fmt: skip
+        return float(high - low)
 
     def _replay(self, fall: Fall) -> None:
         site = self.project.site
@@ -474,12 +515,18 @@ class FallsTab:
             "x": fall.x, "energy": fall.energy, "height": fall.y - np.array(ground),
         }  # fmt: skip
         _fit(self._tracks, fall.x, fall.energy)
+        self._above.end = HEAD * (float(self._track.data["height"].max()) or 1.0)
         self._tracks.visible = True
         self._time.end = fall.duration
         self._time.value = 0.0
         parts = ["rigdda", *self._replay_arguments(fall)]
+        words = (
+            f"{fall.event}, seed {fall.seed}: {fall.end}. A block of {fall.mass:.3g} tonnes, at "
+            f"most {fall.energy.max():,.0f} kilojoules and {fall.speed.max():.3g} metres per "
+            "second."
+        )
         self._rerun.object = (
-            f"{paragraph(f'{fall.event}, seed {fall.seed}: {fall.end}')}"
+            f"{paragraph(words)}"
             f"<p style='margin:2px 0;color:{self.theme.quiet}'>To record it for rerun: "
             f"<code>{html.escape(shlex.join(parts))}</code></p>"
         )
@@ -510,7 +557,11 @@ class FallsTab:
 
 def _ends(low: float, high: float) -> str:
     """Return an interval; empty if there are no values."""
-    return f"{shown(low)} to {shown(high)}" if np.isfinite(low) or np.isfinite(high) else ""
+    if np.isfinite(low) and np.isfinite(high):
+        return f"{shown(low)} to {shown(high)}"
+    if np.isfinite(low):
+        return f"above {shown(low)}"
+    return f"below {shown(high)}" if np.isfinite(high) else ""
 
 
 def _fit(plot: Any, x: Any, y: Any) -> None:
@@ -518,4 +569,4 @@ def _fit(plot: Any, x: Any, y: Any) -> None:
     if x is not None:
         margin = 0.02 * (float(np.max(x) - np.min(x)) or 1.0)
         plot.x_range.start, plot.x_range.end = float(np.min(x)) - margin, float(np.max(x)) + margin
-    plot.y_range.start, plot.y_range.end = 0.0, 1.08 * (float(np.nanmax(y)) or 1.0)
+    plot.y_range.start, plot.y_range.end = 0.0, HEAD * (float(np.nanmax(y)) or 1.0)

@@ -16,8 +16,8 @@ class Found(NamedTuple):
 
     odd: tuple[str, ...]
     """What looks odd, each in a sentence."""
-    placeholders: int
-    """Number of values of the site file that are marked as placeholders."""
+    placeholders: tuple[str, ...]
+    """Values of the site file that are marked as placeholders."""
     fault: str = ""
     """Why nothing was checked; empty if it was."""
 
@@ -66,12 +66,12 @@ class Findings:
         try:
             written = site_oddities.written_events(str(file))
             odd = site_oddities.oddities(site, (), written)
-            found = Found(tuple(odd), site_check.placeholders(str(file)))
+            found = Found(tuple(odd), tuple(site_check.placeholders(str(file))))
         except (Error, OSError) as error:
-            found = Found((), 0, str(error))
+            found = Found((), (), str(error))
         except Exception as error:  # shown on the page
             traceback.print_exc()
-            found = Found((), 0, f"{type(error).__name__}: {error}")
+            found = Found((), (), f"{type(error).__name__}: {error}")
         with self._lock:
             if site is self._asked:
                 self.found = found

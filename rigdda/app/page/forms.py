@@ -53,13 +53,13 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "")
     def cell(tag: str, value: str, k: int) -> str:
         side = "left" if k == 0 else "right"
         bold = "600" if tag == "th" else "400"
-        style = f"text-align:{side};padding:3px 8px;font-weight:{bold};vertical-align:top"
+        style = f"text-align:{side};padding:3px 6px;font-weight:{bold};vertical-align:top"
         scope = " scope='col'" if tag == "th" else ""
         return f"<{tag}{scope} style='{style}'>{html.escape(value)}</{tag}>"
 
     out = "<table style='border-collapse:collapse;width:100%;font-size:14px'>"
     if caption:
-        style = "text-align:left;padding:3px 8px"
+        style = "text-align:left;padding:3px 6px"
         out += f"<caption style='{style}'>{html.escape(caption)}</caption>"
     out += "<tr>" + "".join(cell("th", v, k) for k, v in enumerate(head)) + "</tr>"
     for row in rows:

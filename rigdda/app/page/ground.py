@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from rigdda import BadInput, Error, Site, check
 from rigdda.app.page.loading import IMPORTING
+from rigdda.app.reports.wording import survey_grid
 from rigdda.app.uncertainty import observations
 from rigdda.app.uncertainty.observations import DataSets
 from rigdda.app.uncertainty.parameters import Parameter
@@ -113,12 +114,14 @@ def keep(folder: Path, name: str, content: bytes, site: Site) -> Path:
         part.write_bytes(content)
     try:
         observed(files(folder), site)
-    except BadInput:
+    except BadInput as bad:
         file.unlink()
         if before is not None:
             with atomic(file) as part:
                 part.write_bytes(before)
-        raise
+        grid = survey_grid(site)
+        hint = f"{bad.hint}. Chainages are those of the page. {grid}" if grid else bad.hint
+        raise BadInput(bad.field, bad.value, hint) from None
     return file
 
 

@@ -21,6 +21,7 @@ from rigdda.app.page.jobs import CANCELLED, FAILED, FINISHED, INTERRUPTED, RUNNI
 from rigdda.app.page.locking import watch
 from rigdda.app.page.section import Section, plain_axes
 from rigdda.app.page.theme import SERIES, TALL, WRAPPED
+from rigdda.app.reports.wording import survey_grid
 from rigdda.app.uncertainty.observations import DEPOSIT, OBSERVED_RUN_OUT
 from rigdda.app.uncertainty.parameters import Parameter
 from rigdda.app.uncertainty.parameters import ground as grounds_of
@@ -87,11 +88,12 @@ class GroundTab:
         watch(self._set, self._show_match)
         self._score = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._sliders = pn.Column(width=WIDE - 20)
+        self._grid = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._files = pn.Column(width=WIDE - 20)
         self._upload = pn.widgets.FileInput(accept=".csv", width=WIDE - 60)
         self._build_fit()
         right = pn.Column(
-            heading("Observations"), text(FORMS), self._upload,
+            heading("Observations"), text(FORMS), self._grid, self._upload,
             button("Add the observations", self._add), self._files, self._sliders,
             width=WIDE, scroll=True, styles=TALL,
         )  # fmt: skip
@@ -110,6 +112,7 @@ class GroundTab:
         paths = ground.files(self.project.folder)
         stamps = [(path, path.stat().st_mtime_ns) for path in paths]
         self._parameters = {one.path: one for one in grounds_of(site)}
+        self._grid.object = paragraph(survey_grid(site))
         structure = tuple(self._parameters)
         if structure != self._structure:
             self._structure = structure
@@ -159,7 +162,7 @@ class GroundTab:
                   legend_label="observed")  # fmt: skip
         plot.line("x", "y", source=self._made, line_color=SERIES[0], line_width=2,
                   legend_label="computed")  # fmt: skip
-        plot.legend.location = "bottom_right"
+        plot.legend.location = "top_left"  # where no curve is
         plain_axes(plot, self.theme)
         plot.visible = False
         return plot
@@ -194,13 +197,13 @@ class GroundTab:
     def _build(self, site: Site) -> None:
         """Build the sliders of the grounds anew, for a site with other grounds than before."""
         self._bound = []
-        labels = {f"{_field(p)} of {_surface(p)}": p for p in self._parameters}
+        labels = {f"{_field(p)} of {_surface_words(p)}": p for p in self._parameters}
         self._fitted.options = labels
         self._fitted.value = [p for p in labels.values() if p.endswith(".rolling")][:1]
         rows: list[Any] = [heading("Grounds, within the ranges of the library")]
         for path, one in self._parameters.items():
             widget = pn.widgets.EditableFloatSlider(
-                label=f"{_label(path)}, {_surface(path)}", start=one.low, end=one.high,
+                label=f"{_label(path)}, {_surface_words(path)}", start=one.low, end=one.high,
                 step=(one.high - one.low) / STEPS, width=WIDE - 60, margin=(2, 8),
             )  # fmt: skip
             get = partial(self._value, path)
@@ -212,7 +215,7 @@ class GroundTab:
         return float(getattr(self.project.site.surfaces[_surface(path)], path.split(".")[-1]))
 
     def _change(self, path: str, value: float) -> None:
-        words = f"set {_field(path)} of {_surface(path)}"
+        words = f"set {_field(path)} of {_surface_words(path)}"
         place = tuple(path.split("."))
         self.page.act(lambda: self.project.set_value(place, round(float(value), 6), words))
 
@@ -379,6 +382,11 @@ class GroundTab:
 def _surface(path: str) -> str:
     """Return the name of the surface of a number of the ground."""
     return path.split(".")[1]
+
+
+def _surface_words(path: str) -> str:
+    """Return the name of the surface of a number of the ground in words."""
+    return _surface(path).replace("_", " ")
 
 
 def _field(path: str) -> str:

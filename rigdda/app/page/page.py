@@ -125,7 +125,7 @@ class Page:
             self._reread.visible = self._keep.visible = True
             return False
         except (Error, OSError) as error:
-            self._say(str(error), bad=True)
+            self._say(_words(error), bad=True)
             self._later()
             return False
         self._say("")
@@ -205,3 +205,10 @@ class Page:
         place = self._tabs[self._tabs.active]
         if place[0] is not tab.panel:  # drawn with its data
             place[:] = [tab.panel]
+
+
+def _words(error: Exception) -> str:
+    """Return an error as a sentence; a value that is missing is not mentioned."""
+    if isinstance(error, BadInput) and error.value is None:
+        return f"{error.field}: {error.hint}"
+    return str(error)

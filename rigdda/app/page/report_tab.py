@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import panel as pn
 
 from rigdda import BadInput
-from rigdda.agents.run_record import RECORD_FILE as RECORD
+from rigdda.agents import run_record
 from rigdda.app.page.forms import button, heading, paragraph, text
 from rigdda.app.page.jobs import FAILED, FINISHED, RUNNING
 from rigdda.app.page.known_layout import CURRENT, NOTHING
@@ -28,6 +28,12 @@ WORST = 3
 PAGES = ("report.html", "report.pdf")
 """Files that a report may have."""
 
+CONTENTS = {
+    "design": "search for the best layout", "fit": "fit of the ground",
+    "study": "figures of the layout", "simulate": "releases",
+}  # fmt: skip
+"""What commands write, in words."""
+
 SLOW = 10
 """Number of looks of the page between two looks at the report."""
 
@@ -39,7 +45,7 @@ class ReportTab:
         self.page, self.project, self.theme = page, page.project, page.theme
         self.job, self.study = page.workspace.report, page.workspace.study
         self._count = 0
-        self._results = pn.widgets.CheckBoxGroup(label="Results", options=[])
+        self._results = pn.widgets.CheckBoxGroup(label="Results", options={})
         self._pdf = pn.widgets.Checkbox(label="Print it to PDF as well", value=True)
         self._worst = pn.widgets.Checkbox(
             label=f"With the {WORST} worst releases and failures of barriers of each", value=True
@@ -60,11 +66,14 @@ class ReportTab:
 
     def show(self) -> None:
         """Show the results that there are."""
-        found = sorted(file.parent.name for file in self.project.folder.glob(f"*/{RECORD}"))
-        found = [name for name in found if name != self.page.workspace.report_folder.name]
-        if self._results.options != found:
-            new = [name for name in found if name not in self._results.options]
-            kept = [name for name in self._results.value if name in found]
+        own = self.page.workspace.report_folder.name
+        files = sorted(self.project.folder.glob(f"*/{run_record.RECORD_FILE}"))
+        folders = [file.parent for file in files if file.parent.name != own]
+        found = {f"{one.name}: {words}": one.name for one in folders if (words := _content(one))}
+        before = self._results.options
+        if before != found:
+            new = [name for name in found.values() if name not in before.values()]
+            kept = [name for name in self._results.value if name in found.values()]
             self._results.options = found
             self._results.value = kept + new
         self._look()
@@ -148,6 +157,20 @@ class ReportTab:
             f"<p><a style='{style}' target='_blank' rel='noopener' "
             f"href='report/{file.name}?{stamp}'>Open {file.name}</a></p>"
         )
+
+
+def _content(folder: Path) -> str:
+    """Return in words what is in a results folder; empty if a command in it has not ended."""
+    try:
+        records = run_record.read(folder)
+    except (BadInput, OSError):
+        return ""
+    if not all(record.ended for record in records.values()):
+        return ""
+    return "; ".join(
+        f"{CONTENTS.get(record.command, record.command)}, {record.ended[:16].replace('T', ' ')} UTC"
+        for record in records.values()
+    )
 
 
 def _rows(file: Path) -> list[dict[str, str]]:

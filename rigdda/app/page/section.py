@@ -25,8 +25,11 @@ MARGIN = 0.06
 BORDER = 62
 """Space left of an axis, so that figures below one another are aligned [pixels]."""
 
-HEIGHT = 400
-"""Height of the figure [pixels]."""
+WIDTH, HEIGHT = 775, 400
+"""Size of the figure in a window 1280 pixels wide, in which it has its least height [pixels]."""
+
+WIDEST = 1400
+"""Largest width of the figure, so that what follows it stays visible in a wide window [pixels]."""
 
 MOVED = 1e-6
 """Distance from which on a handle has been moved [m]."""
@@ -65,7 +68,7 @@ class Section:
     name : str
         Title of the figure.
     height : int
-        Its height [pixels].
+        Its height in a window 1280 pixels wide [pixels].
     coordinates : bool
         Whether it shows the coordinates and the inclination of the ground under the cursor.
 
@@ -78,7 +81,8 @@ class Section:
     def __init__(self, theme: Theme, name: str, height: int = HEIGHT, coordinates: bool = False):
         self.theme, self._coordinates = theme, coordinates
         self.plot = figure(
-            height=height, sizing_mode="stretch_width", match_aspect=True,
+            min_height=height, max_width=WIDEST, aspect_ratio=WIDTH / height,
+            sizing_mode="scale_width", match_aspect=True,
             tools="pan,wheel_zoom,box_zoom,reset", active_scroll="wheel_zoom", active_drag="pan",
             x_axis_label="chainage [metres]", y_axis_label="elevation [metres]",
             toolbar_location="right", name=name, min_border_left=BORDER,
@@ -126,6 +130,7 @@ class Section:
             plot.add_tools(
                 HoverTool(
                     renderers=[line], mode="vline", line_policy="prev", description="coordinates",
+                    attachment="above",
                     tooltips=[("chainage", "$x{0.00} metres"), ("elevation", "$y{0.00} metres"),
                               ("slope here", "@slope{0.0} degrees")],
                 )

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import panel as pn
+from bokeh.models import CustomJS
 from tornado.httputil import HTTPHeaders, HTTPServerRequest
 from tornado.web import OutputTransform, StaticFileHandler
 from tornado.websocket import WebSocketClosedError
@@ -50,6 +51,13 @@ ICON = (
     "fill='%230b5fa5'/%3E%3C/svg%3E"
 )
 """Icon of the page: a block above a slope."""
+
+PATIENT = """
+Bokeh.require("core/ui_gestures").UIGestures.press_threshold = 2 ** 31 - 1
+"""
+"""Script that lets a user hold a handle for as long as they want before they drag it. Bokeh takes a
+button that is held still for 0.3 s for a long press, after which nothing can be dragged, and a busy
+browser sees every drag like this. No tool of the page uses long presses."""
 
 REFUSED = b"this address is not that of the page\n"
 """Answer to a request that names another host."""
@@ -132,6 +140,7 @@ def _session(workspace: Workspace) -> Any:
     colours = theme.DARK if pn.config.theme == "dark" else theme.LIGHT
     pn.config.raw_css = [theme.css(colours)]
     pn.state.curdoc.template_variables["app_favicon"] = ICON
+    pn.state.curdoc.js_on_event("document_ready", CustomJS(code=PATIENT))
     made: list[Page] = []
     holding(lambda: made.append(Page(workspace, colours)))
     return made[0].panel

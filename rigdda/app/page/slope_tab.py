@@ -22,6 +22,8 @@ from rigdda.app.page.loading import IMPORTING
 from rigdda.app.page.locking import soon
 from rigdda.app.page.section import HandleSource, Section, ground_colour
 from rigdda.app.page.theme import TALL
+from rigdda.app.reports.wording import survey_grid
+from rigdda.app.value_origins import accepted
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import spikes
 
@@ -55,9 +57,10 @@ class SlopeTab:
         page.workspace.workers.add(self._checks)
         self._told: Found | None = None
         self._findings = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
+        self._accept = button("Accept these values", self._accept_values, visible=False)
         self._forms = pn.Column(width=WIDE, scroll=True, styles=TALL)
         self._import = self._importer()
-        self._left = pn.Column(self._findings, sizing_mode="stretch_width")
+        self._left = pn.Column(self._findings, self._accept, sizing_mode="stretch_width")
         self.panel = pn.Row(
             self._left,
             self._forms,
@@ -68,14 +71,14 @@ class SlopeTab:
         """Show the site as it is now."""
         if not self.project.has_site:
             self._forms[:] = [self._import]
-            self._left[:], self._rows = [self._findings], {}
+            self._left[:], self._rows = [self._findings, self._accept], {}
             words = "There is no site yet: import a survey."
             self._findings.object = f"<p>{words}</p>"
             return
         site = self.project.site
         self.section.show(site)
-        if len(self._left) == 1:  # without a ground, the figure has no ranges
-            self._left[:] = [self.section.plot, self._findings]
+        if self._left[0] is self._findings:  # without a ground, the figure has no ranges
+            self._left[:] = [self.section.plot, self._findings, self._accept]
         self._handles = handles(site)
         self._places.show(
             {
@@ -115,7 +118,7 @@ class SlopeTab:
         plot.toolbar.active_drag = drag
         plot.add_tools(
             HoverTool(
-                renderers=[places], description="names of the handles",
+                renderers=[places], description="names of the handles", attachment="below",
                 tooltips=[("", "@words"), ("chainage", "@x{0.00} metres")],
             )
         )  # fmt: skip
@@ -137,18 +140,27 @@ class SlopeTab:
 
     def _show_found(self, found: Found) -> None:
         """Show what `rigdda check` finds without releases, as a list."""
-        odd, count = found.odd, found.placeholders
+        odd, left = found.odd, found.placeholders
         head = "Nothing looks odd." if not odd else f"{len(odd)} to look at:"
         head = found.fault or head
         lines = "".join(f"<li>{html.escape(line)}</li>" for line in odd)
-        rest = f"<p>The site file marks {count} values as placeholders to replace.</p>"
-        command = f"rigdda check {self.project.where.site}"
-        self._findings.object = (
-            f"<h2 style='font-size:15px;margin:8px 0 2px'>{html.escape(head)}</h2>"
-            f"<ul style='margin:2px 0;padding-left:20px'>{lines}</ul>{rest if count else ''}"
-            f"<p style='color:{self.theme.quiet}'>The same, with a few releases: "
-            f"<code>{html.escape(command)}</code></p>"
+        rest = (
+            f"<p>The site file marks these values as placeholders. Change them, or accept them if "
+            f"they are right: {html.escape(', '.join(left))}.</p>"
         )
+        command = f"rigdda check {self.project.where.site}"
+        quiet = f"color:{self.theme.quiet}"
+        self._findings.object = (
+            f"<p style='margin:8px 0 0;{quiet}'>{html.escape(survey_grid(self.project.site))}</p>"
+            f"<h2 style='font-size:15px;margin:8px 0 2px'>{html.escape(head)}</h2>"
+            f"<ul style='margin:2px 0;padding-left:20px'>{lines}</ul>"
+            f"<p style='{quiet}'>The same, with a few releases: "
+            f"<code>{html.escape(command)}</code></p>{rest if left else ''}"
+        )
+        self._accept.visible = bool(left)
+
+    def _accept_values(self) -> None:
+        self._edit(accepted, "accepted the placeholders")
 
     def _set(self, path: Path_, words: str) -> Callable[[Any], None]:
         """Return a function that writes a value of the site file."""
@@ -201,12 +213,30 @@ class SlopeTab:
             from_ = place if sized else None
             yield ("event", i, sources, from_), partial(self._event, i, sources, from_)
         yield ("new event",), lambda: [button("Add an event", self._add_event)]
+        yield ("description",), self._description
         yield (
             ("import",),
             lambda: [
                 pn.Card(self._import, title="Import a survey", collapsed=True, width=WIDE - 30)
             ],
         )
+
+    def _description(self) -> list[Any]:
+        """Return the inputs for the name and the description of the site."""
+        name = Bound(
+            pn.widgets.TextInput(label="Name of the site", width=340, margin=(2, 8)),
+            partial(_value, self.project, ("name",)), self._set(("name",), "the name of the site"),
+        )  # fmt: skip
+        words = Bound(
+            pn.widgets.TextAreaInput(
+                label="What is known of the slope, and by whom; it begins the report", width=380,
+                height=90, margin=(2, 8),
+            ),
+            partial(_value, self.project, ("description",)),
+            self._set(("description",), "the description of the site"),
+        )  # fmt: skip
+        self._bound += [name, words]
+        return [heading("Description"), name.widget, words.widget]
 
     def _outlier(self, site: Site, k: int, height: float) -> list[Any]:
         """Return how an outlier of the survey is mended."""
@@ -459,11 +489,12 @@ class SlopeTab:
                     self._import_survey(name.value, file, layer.value or None, ends)
                 )
             ):
-                self.page.say("; ".join([f"The site is made of {file.filename}", *notes]))
+                self.page.say(" — ".join([f"The site is made of {file.filename}", *notes]))
 
         return pn.Column(
             text("A table (CSV) with chainage and elevation in metres, or a drawing (DXF) with a "
-                 "polyline. What is left empty becomes a placeholder to replace."),
+                 "polyline. The edges of the road are chainages of the survey. What is left "
+                 "empty becomes a placeholder to replace."),
             name, file, layer, pn.Row(*road),
             button("Make the site", begin, primary=True),
             width=WIDE - 40,

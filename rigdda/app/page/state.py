@@ -33,7 +33,7 @@ BESIDE = ".page"
 KEPT = 100
 """Number of steps that can be undone."""
 
-NAME = re.compile(r"[\w][\w ()+-]{0,59}")
+NAME = re.compile(r"[\w][\w (),+-]{0,59}")
 """Name of an alternative, which is that of its file."""
 
 
@@ -321,7 +321,7 @@ class Project:
 
     def _alternative(self, name: str) -> Path:
         if not NAME.fullmatch(name):
-            hint = "use letters, digits, spaces, -, + and _, at most 60"
+            hint = "use letters, digits, spaces, commas, -, + and _, at most 60"
             raise BadInput("name of the alternative", name, hint)
         return self.folder / ALTERNATIVES / f"{name}.toml"
 

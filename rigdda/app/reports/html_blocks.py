@@ -318,6 +318,19 @@ def _said(text: str) -> str:
     return {"True": "yes", "False": "no"}.get(text, text)
 
 
+def mixed(head: str, name: str) -> Column:
+    """Return a column of texts and numbers, of which the numbers are rounded."""
+    return Column(head, (name,), _rounded, number=False)
+
+
+def _rounded(text: str) -> str:
+    try:
+        found = float(text)
+    except ValueError:
+        return text
+    return figure(found) if math.isfinite(found) else text
+
+
 def value(head: str, name: str, form: NumberForm = figure) -> Column:
     """Return a column of numbers, "-" where there is none."""
     return Column(head, (name,), lambda x: "-" if math.isnan(x) else form(x))

@@ -42,6 +42,21 @@ def surveyed(site: Site, x: float) -> str:
     return f" (survey: chainage {chainage:,.1f} m, elevation {elevation:,.1f} m)"
 
 
+def survey_grid(site: Site) -> str:
+    """Return in words how coordinates of the survey follow from those of the site.
+
+    The text is empty if they are the same.
+    """
+    origin = site.origin
+    if not origin.surveyed:
+        return ""
+    sign = "less" if origin.reversed else "plus"
+    words = f"Chainage in the survey: {origin.chainage:,.10g} metres {sign} the chainage here."
+    if origin.elevation:
+        words += f" Elevation in the survey: {origin.elevation:,.10g} metres plus that here."
+    return words
+
+
 def survey_place(site: Site, x: float) -> dict[str, float]:
     """Return the columns with the chainage and elevation of the ground on the survey at `x`.
 

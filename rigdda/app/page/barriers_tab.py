@@ -17,6 +17,7 @@ from rigdda.app.page import placing
 from rigdda.app.page.falls import Fall, Release
 from rigdda.app.page.forms import Bound, button, heading, in_words, legend, number, paragraph, table
 from rigdda.app.page.known_layout import LiveFigures
+from rigdda.app.page.live import CHECKED
 from rigdda.app.page.placing import Grip
 from rigdda.app.page.section import HandleSource, Section
 from rigdda.app.page.theme import SERIES, TALL
@@ -380,8 +381,12 @@ def figures_html(found: LiveFigures, bad: str, quiet: str) -> str:
         out += paragraph(f"Individual risk: {value:.2g} ({low:.2g} to {high:.2g}) per year")
     if found.checks is not None:
         out += _checks(found, bad)
+    elif found.broken:
+        out += paragraph("The barriers are checked when the layout keeps all rules.")
     elif found.layout:
-        out += paragraph("The checks of the barriers follow after 50 releases of each event.")
+        out += paragraph(
+            f"The checks of the barriers follow after {CHECKED} releases of each event."
+        )
     return out
 
 

@@ -1,4 +1,4 @@
-"""The command line as users meet it: real processes, real files."""
+"""The command line as users meet it: real files, and real processes for what only they show."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 
 import pytest
-from processes import png_size, refused, rig, rows, run, run_told
+from processes import png_size, refused, rig, rows, run, run_process, run_told
 from rerun.chunk import RrdReader
 
 import rigdda
@@ -306,9 +306,9 @@ def test_every_command_explains_itself(command: str, tmp_path: Path) -> None:
 
 
 def test_without_a_command_help_is_shown(tmp_path: Path) -> None:
-    words = run(folder=tmp_path)
+    words = run_process(folder=tmp_path)
     assert all(command in words for command in COMMANDS)
-    assert run("--version", folder=tmp_path) == f"rigdda {rigdda.__version__}\n"
+    assert run_process("--version", folder=tmp_path) == f"rigdda {rigdda.__version__}\n"
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import os
 import pty
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from processes import png_size, refused, rig, rows, run, run_process, run_told
@@ -39,12 +40,26 @@ def toml(site: Site, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+class Designed(NamedTuple):
+    """The folder of a design, its output, and the answers that were told before it ended."""
+
+    folder: Path
+    words: str
+    told: list[str]
+
+
 @pytest.fixture(scope="module")
-def designed(toml: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The folder and the words of a small design of a cheap site."""
+def small_design(toml: Path, tmp_path_factory: pytest.TempPathFactory) -> Designed:
+    """A small design of a cheap site."""
     folder = tmp_path_factory.mktemp("designed")
     options = (*TINY, "--ground-samples", 1, "--seed", 3, "--out", folder)
-    return folder, run("design", toml, *options, folder=folder)
+    return Designed(folder, *run_told("design", toml, *options, folder=folder))
+
+
+@pytest.fixture
+def designed(small_design: Designed) -> tuple[Path, str]:
+    """The folder and the words of a small design of a cheap site."""
+    return small_design.folder, small_design.words
 
 
 def without_time(file: Path) -> list[dict[str, str]]:
@@ -427,16 +442,18 @@ def on_terminal(*arguments: object, folder: Path) -> bytes:
     return seen
 
 
-def test_a_design_answers_before_it_is_done(toml: Path, tmp_path: Path) -> None:
-    words, told = run_told("design", toml, *TINY, "--out", "a", folder=tmp_path)
+def test_a_design_answers_before_it_is_done(
+    small_design: Designed, toml: Path, tmp_path: Path
+) -> None:
+    _, words, told = small_design
     assert told and told[0].startswith("so far, with 40 releases of each layout: Z nothing ")
     assert ", rule " in told[0] and ", constant " in told[0]
     assert "verification: 40 new releases" in words
-    coarse = ("--budget", "4000", "--verify", "800", "--ground-samples", "0", "--precision", "0.3")
+    coarse = ("--budget", "2000", "--verify", "400", "--ground-samples", "0", "--precision", "0.3")
     seen = on_terminal("design", toml, *coarse, "--out", "b", folder=tmp_path)
-    assert b"so far (100 releases each)" in seen and b"best so far" in seen
+    assert b"so far (50 releases each)" in seen and b"best so far" in seen
     found = rows(tmp_path / "b/evaluations.csv")
-    assert int(found[-1]["simulations"]) < 4000 and int(found[-1]["releases"]) < 800
+    assert int(found[-1]["simulations"]) < 2000 and int(found[-1]["releases"]) < 400
 
 
 def test_a_terminal_sees_progress(toml: Path, tmp_path: Path) -> None:

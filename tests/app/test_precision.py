@@ -25,7 +25,7 @@ from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.comparison import Difference
 from rigdda.envs.problem import Targets
 
-MANY = 20_000
+MANY = 10_000
 GOOD, NEAR, POOR = (
     (Fence(x, 3.0, energy_class=500),) for x in (20.0, 20.1, 12.0)
 )  # what they hold in the valley: 95 %, about the same, next to nothing
@@ -177,16 +177,16 @@ def test_a_study_uses_all_releases_or_stops(site: Site, few_blocks: None, tmp_pa
         out = tmp_path / str(precision)
         out.mkdir()
         done, _ = design.design(
-            problem, "race", 1500, 0, 400, out, lambda *_: None, precision=precision
+            problem, "race", 800, 0, 200, out, lambda *_: None, precision=precision
         )
         assert {c.evaluation.releases for c in done.cases} == {done.chosen.evaluation.releases}
         again, resumed = design.design(
-            problem, "race", 1500, 0, 400, out, lambda *_: None, precision=precision
+            problem, "race", 800, 0, 200, out, lambda *_: None, precision=precision
         )
         assert resumed.simulated == 0
         assert [c.evaluation for c in again.cases] == [c.evaluation for c in done.cases]
         found[precision] = done
     whole, stopped = found[0.0], found[0.1]
-    assert whole.result.simulations == 1500 and whole.chosen.evaluation.releases == 400
-    assert whole.chosen.evaluation == verify(problem, whole.result.layout, 400, 0)
-    assert stopped.result.simulations < 1500 and stopped.chosen.evaluation.releases < 400
+    assert whole.result.simulations == 800 and whole.chosen.evaluation.releases == 200
+    assert whole.chosen.evaluation == verify(problem, whole.result.layout, 200, 0)
+    assert stopped.result.simulations < 800 and stopped.chosen.evaluation.releases < 200

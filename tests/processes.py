@@ -9,7 +9,6 @@ import re
 import struct
 import subprocess
 import sys
-from collections.abc import Sequence
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from unittest.mock import patch
@@ -46,18 +45,18 @@ def run(*arguments: object, folder: Path) -> str:
 
 def run_told(*arguments: object, folder: Path) -> tuple[str, list[str]]:
     """Run to success; return standard output and the answers that were told before the end."""
-    return _success(*_called(arguments, folder))
+    return _success(*called(*arguments, folder=folder))
 
 
 def refused(*arguments: object, folder: Path) -> str:
     """Ask for what is refused, in this process; return the one line on standard error."""
-    code, out, line = _called(arguments, folder)
+    code, out, line = called(*arguments, folder=folder)
     assert (code, out) == (2, ""), line
     assert line.count("\n") == 1 and line.endswith("\n") and "Traceback" not in line
     return line
 
 
-def _called(arguments: Sequence[object], folder: Path) -> tuple[int, str, str]:
+def called(*arguments: object, folder: Path) -> tuple[int, str, str]:
     """Run a command in this process; return its exit code and what it wrote on both streams."""
     out, err = io.StringIO(), io.StringIO()
     with (

@@ -449,11 +449,11 @@ def test_a_design_answers_before_it_is_done(
     assert told and told[0].startswith("so far, with 40 releases of each layout: Z nothing ")
     assert ", rule " in told[0] and ", constant " in told[0]
     assert "verification: 40 new releases" in words
-    coarse = ("--budget", "2000", "--verify", "400", "--ground-samples", "0", "--precision", "0.3")
+    coarse = ("--budget", "4000", "--verify", "800", "--ground-samples", "0", "--precision", "0.3")
     seen = on_terminal("design", toml, *coarse, "--out", "b", folder=tmp_path)
-    assert b"so far (50 releases each)" in seen and b"best so far" in seen
+    assert b"so far (100 releases each)" in seen and b"best so far" in seen
     found = rows(tmp_path / "b/evaluations.csv")
-    assert int(found[-1]["simulations"]) < 2000 and int(found[-1]["releases"]) < 400
+    assert int(found[-1]["simulations"]) < 4000 and int(found[-1]["releases"]) < 800
 
 
 def test_a_terminal_sees_progress(toml: Path, tmp_path: Path) -> None:

@@ -82,7 +82,7 @@ def test_a_designer_builds_only_what_is_allowed(name: str, kinds: tuple[str, ...
 
 @pytest.mark.parametrize("name", SEARCHES)
 def test_a_search_is_better_than_no_barrier(name: str, valley: Valley) -> None:
-    found = design(name, valley, 1000)
+    found = design(name, valley, 1500)
     assert valley.truth(found.layout) < valley.truth(())
     assert () in {e.evaluation.layout for e in found.history.stage("final")}
 

@@ -110,15 +110,15 @@ def test_errors_of_a_worker_are_those_of_this_process(scheduler: str) -> None:
 
 
 def test_a_worker_that_dies_loses_nothing(scheduler: str) -> None:
-    asked = jobs(300)
+    asked = jobs(600)
     here = rigdda.release_many(asked)
     third = worker(scheduler)
     try:
         wait_for(3, scheduler)
         with distribution.connected(f"dask://{scheduler}"):
             found = []
-            for start in range(0, len(asked), 100):
-                found += rigdda.release_many(asked[start : start + 100])
+            for start in range(0, len(asked), 200):
+                found += rigdda.release_many(asked[start : start + 200])
                 third.kill()
     finally:
         third.kill()

@@ -222,7 +222,7 @@ def test_a_barrier_without_room_for_larger_blocks_is_told() -> None:
         plan(site, fence, choose(("sizes",), site, fence), "morris", 4, 20, 0)
 
 
-COMMAND = ("sensitivity", "narrow", "--samples", 8, "--releases", 24, "--layout", "layout.toml")
+COMMAND = ("sensitivity", "narrow", "--samples", 8, "--releases", 40, "--layout", "layout.toml")
 
 
 @pytest.fixture(scope="module")

@@ -41,7 +41,9 @@ def design(name: str, problem: DesignProblem, simulations: int, seed: int = 0) -
     return found
 
 
-@pytest.mark.parametrize("simulations", [2, 5, 17, 64, 200])
+@pytest.mark.parametrize(
+    "simulations", [2, 17, 200, *(pytest.param(n, marks=pytest.mark.slow) for n in (5, 64))]
+)
 @pytest.mark.parametrize("name", ALL)
 def test_a_budget_is_kept_and_what_is_reported_chose_nothing(
     name: str, simulations: int, valley: Valley
@@ -64,7 +66,8 @@ def test_the_same_seed_gives_the_same_result(name: str, valley: Valley) -> None:
     first = design(name, valley, 150, seed=3)
     np.random.seed(6)  # noqa: NPY002
     assert design(name, valley, 150, seed=3) == first
-    assert design(name, valley, 150, seed=4).evaluation.seeds != first.evaluation.seeds
+    other = design(name, valley, 40, seed=4)
+    assert not set(other.evaluation.seeds) & set(first.evaluation.seeds)
 
 
 @pytest.mark.parametrize("name", ALL)

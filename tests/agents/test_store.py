@@ -102,18 +102,18 @@ def test_a_killed_search_goes_on_where_it_stopped(
 ) -> None:
     design = getattr(rigdda.agents, name).design
     file = tmp_path / "store.jsonl"
-    whole = design(valley, 150, store=Store(file))
+    whole = design(valley, 80, store=Store(file))
     lines = file.read_bytes().splitlines(keepends=True)
     half = len(lines) // 2
     file.write_bytes(b"".join(lines[:half]) + tail)
     with pytest.warns(DoubtfulInput) if tail.endswith(b"\n") else nullcontext():
         store = Store(file)
-    assert design(valley, 150, store=store) == whole
+    assert design(valley, 80, store=store) == whole
     assert store.resumed > 0 and store.simulated > 0
     assert file.read_bytes().replace(b"\x00\x00\n", b"") == b"".join(lines)
     with pytest.warns(DoubtfulInput) if tail.endswith(b"\n") else nullcontext():
         again = Store(file)
-    assert design(valley, 150, store=again) == whole
+    assert design(valley, 80, store=again) == whole
     assert again.simulated == 0
 
 

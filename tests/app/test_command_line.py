@@ -1,4 +1,4 @@
-"""The command line as users meet it: real processes, real files."""
+"""The command line as users meet it: real files, and real processes for what only they show."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import os
 import pty
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
-from processes import png_size, refused, rig, rows, run, run_told
+from processes import png_size, refused, rig, rows, run, run_process, run_told
 from rerun.chunk import RrdReader
 
 import rigdda
@@ -39,12 +40,26 @@ def toml(site: Site, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+class Designed(NamedTuple):
+    """The folder of a design, its output, and the answers that were told before it ended."""
+
+    folder: Path
+    words: str
+    told: list[str]
+
+
 @pytest.fixture(scope="module")
-def designed(toml: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The folder and the words of a small design of a cheap site."""
+def small_design(toml: Path, tmp_path_factory: pytest.TempPathFactory) -> Designed:
+    """A small design of a cheap site."""
     folder = tmp_path_factory.mktemp("designed")
     options = (*TINY, "--ground-samples", 1, "--seed", 3, "--out", folder)
-    return folder, run("design", toml, *options, folder=folder)
+    return Designed(folder, *run_told("design", toml, *options, folder=folder))
+
+
+@pytest.fixture
+def designed(small_design: Designed) -> tuple[Path, str]:
+    """The folder and the words of a small design of a cheap site."""
+    return small_design.folder, small_design.words
 
 
 def without_time(file: Path) -> list[dict[str, str]]:
@@ -306,9 +321,9 @@ def test_every_command_explains_itself(command: str, tmp_path: Path) -> None:
 
 
 def test_without_a_command_help_is_shown(tmp_path: Path) -> None:
-    words = run(folder=tmp_path)
+    words = run_process(folder=tmp_path)
     assert all(command in words for command in COMMANDS)
-    assert run("--version", folder=tmp_path) == f"rigdda {rigdda.__version__}\n"
+    assert run_process("--version", folder=tmp_path) == f"rigdda {rigdda.__version__}\n"
 
 
 @pytest.mark.parametrize(
@@ -427,8 +442,10 @@ def on_terminal(*arguments: object, folder: Path) -> bytes:
     return seen
 
 
-def test_a_design_answers_before_it_is_done(toml: Path, tmp_path: Path) -> None:
-    words, told = run_told("design", toml, *TINY, "--out", "a", folder=tmp_path)
+def test_a_design_answers_before_it_is_done(
+    small_design: Designed, toml: Path, tmp_path: Path
+) -> None:
+    _, words, told = small_design
     assert told and told[0].startswith("so far, with 40 releases of each layout: Z nothing ")
     assert ", rule " in told[0] and ", constant " in told[0]
     assert "verification: 40 new releases" in words

@@ -25,7 +25,7 @@ from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.comparison import Difference
 from rigdda.envs.problem import Targets
 
-MANY = 20_000
+MANY = 10_000
 GOOD, NEAR, POOR = (
     (Fence(x, 3.0, energy_class=500),) for x in (20.0, 20.1, 12.0)
 )  # what they hold in the valley: 95 %, about the same, next to nothing

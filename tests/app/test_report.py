@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 import pytest
+from processes import run
 
 import rigdda
 from rigdda import MECHANICS, BadInput, Site
@@ -54,18 +55,13 @@ class Made(NamedTuple):
 def made(site: Site, tmp_path_factory: pytest.TempPathFactory) -> Made:
     folder = tmp_path_factory.mktemp("report")
     site.save(folder / "chute.toml")
-    command = [sys.executable, "-m", "rigdda.app.cli"]
     printed = ""
     for arguments in (
         [*DESIGN, "--out", "decision"],
         [*SIMULATE, "--out", "before"],
         ["report", "decision", "before", "--out", "out"],
     ):
-        done = subprocess.run(
-            [*command, *arguments], cwd=folder, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr
-        printed += done.stdout
+        printed += run(*arguments, folder=folder)
     return Made(folder, printed, (folder / "out/report.html").read_text(encoding="utf-8"))
 
 

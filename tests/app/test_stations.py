@@ -61,10 +61,10 @@ def weighted(site: Site, table: Table, releases: Table) -> list[Fraction]:
 
 def quantile(sample: list[float], weights: list[Fraction], level: float) -> float:
     """Return the smallest value that at least a share `level` of the weight does not exceed."""
-    below = Fraction(0)
+    below, bound = Fraction(0), Fraction(str(level)) * sum(weights)
     for value, weight in sorted(zip(sample, weights, strict=True)):
         below += weight
-        if below >= Fraction(str(level)) * sum(weights):
+        if below >= bound:
             return value
     raise AssertionError
 

@@ -10,7 +10,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from processes import png_size, refused, rig, rows, run
+from processes import png_size, refused, rig, rows, run, run_process
 
 import rigdda
 from rigdda import Site
@@ -75,7 +75,7 @@ def test_names_are_written_whatever_the_locale(
     (folder / "study.toml").write_text(text, encoding="utf-8")
     for name, value in {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}.items():
         monkeypatch.setenv(name, value)
-    assert "gr??er" in run("study", "study.toml", "--out", "o", folder=folder)
+    assert "gr??er" in run_process("study", "study.toml", "--out", "o", folder=folder)
     assert "größer,block,0" in (folder / "o/study.csv").read_text(encoding="utf-8")
 
 

@@ -111,7 +111,7 @@ def test_the_commands_tell_both_rates(
     )
     assert cli.main(["check", "site.toml", "--out", "c"]) == 0
     assert len(re.findall("note: " + words, capsys.readouterr().out)) == 1
-    options = ["--budget", "200", "--verify", "40", "--out", "d"]
+    options = ["--budget", "200", "--verify", "40", "--ground-samples", "0", "--out", "d"]
     assert cli.main(["design", "site.toml", *options]) == 0
     assert re.search("note: " + words, capsys.readouterr().out)
     assert cli.main(["report", "d"]) == 0

@@ -101,7 +101,7 @@ def test_every_designer_keeps_to_the_cap(name: str, cap: float) -> None:
 
 def test_the_race_spends_what_it_may() -> None:
     problem = DesignProblem(LIGHT, max_cost=400.0)
-    result = module("race").design(problem, 600, seed=0)
+    result = module("race").design(problem, 400, seed=0)
     costs = [e.evaluation.cost for e in result.history.entries]
     assert len({e.evaluation.layout for e in result.history.entries}) >= 8
     assert 0.0 < max(costs) <= 400.0

@@ -23,14 +23,14 @@ flat = pytest.mark.parametrize("flat", [False, True])
 @every
 @flat
 def test_gymnasium_finds_no_fault(name: str, flat: bool) -> None:
-    check_env(gymnasium.make(name, site="quick", releases=1, flat=flat).unwrapped)
+    check_env(gymnasium.make(name, site=CUT, releases=1, flat=flat).unwrapped)
 
 
 @every
 @flat
 def test_stable_baselines3_finds_no_fault(name: str, flat: bool) -> None:
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
-    terms = {"site": "quick", "releases": 1, "render_mode": "rgb_array", "flat": flat}
+    terms = {"site": CUT, "releases": 1, "render_mode": "rgb_array", "flat": flat}
     env = gymnasium.make(name, **terms)
     checker.check_env(env.unwrapped, skip_render_check=False)
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 from cases import cut
+from processes import called
 
 import rigdda
 from rigdda import BadInput, Fence, Site
@@ -26,17 +24,6 @@ CUT = cut()
 LAYOUT = (Fence(12.0, 2.0, energy_class=250),)
 DESIGNS = [name for name in ENVIRONMENTS if "Corridor" not in name]  # records each release
 every = pytest.mark.parametrize("name", DESIGNS)
-
-
-def command(path: Path) -> tuple[int, str, str]:
-    """Return exit code, standard output and standard error of `rigdda repeat`."""
-    root = str(Path(rigdda.__file__).parents[1])
-    paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
-    process = subprocess.run(
-        [sys.executable, "-m", "rigdda.app.cli", "repeat", str(path)],
-        env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
-    return process.returncode, process.stdout, process.stderr
 
 
 def played(name: str, folder: Path, **keywords: Any) -> tuple[Path, list[float]]:
@@ -94,7 +81,7 @@ def test_episodes_of_copies_are_repeated(name: str, tmp_path: Path) -> None:
 
 def test_a_command_repeats_an_episode_and_tells_what_differs(tmp_path: Path) -> None:
     path, (reward,) = played("rigdda/BarrierDesign-v0", tmp_path, site=CUT, releases=2)
-    code, out, _ = command(path)
+    code, out, _ = called("repeat", path, folder=tmp_path)
     assert code == 0 and f"identical bit for bit: reward {reward!r}" in out
 
     record = replay_record.load(path)
@@ -103,7 +90,7 @@ def test_a_command_repeats_an_episode_and_tells_what_differs(tmp_path: Path) -> 
     other = msgspec.structs.replace(record, rewards=[wrong], versions=versions)
     run, _ = rigdda.release(CUT, (), 0)
     run.to_rerun(tmp_path / "other.rrd", Marks(record=as_json(other)))
-    code, out, err = command(tmp_path / "other.rrd")
+    code, out, err = called("repeat", "other.rrd", folder=tmp_path)
     assert code == 1
     assert f"results differ: recorded reward {wrong!r}, computed reward {reward!r}" in err
     assert f"version differs: mechanics 0ld, now {record.versions.mechanics}" in out

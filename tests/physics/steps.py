@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+import pytest
 
 from physics.helpers import FLAT, GRAVITY, rock
 from rigdda import Block, Scene, Settings, Simulation, Terrain
@@ -19,6 +20,16 @@ def accepted(*areas: float) -> tuple[float, ...]:
     """Return the steps [s] that a scene with free blocks of these areas [m2] accepts."""
     longest = longest_step(np.array(areas), GRAVITY)
     return tuple(dt for dt in STEPS if dt <= longest)
+
+
+def each(steps: Sequence[float]) -> list[Any]:
+    """Return steps [s] as parameters of a test.
+
+    The shortest is marked slow: it takes about as long as all others, and the same path.
+    """
+    shortest = min(steps)
+    marks = pytest.mark.slow
+    return [pytest.param(dt, marks=marks) if dt == shortest else dt for dt in steps]
 
 
 def on_floor(

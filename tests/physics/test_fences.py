@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from physics.helpers import FLAT, GRAVITY, box, masses, ngon, polygon, rock, rough
+from physics.steps import each
 from rigdda import (
     BadInput,
     Block,
@@ -48,7 +49,7 @@ GROUND = Terrain(FLAT)
 STEPS = (1.25e-3, 2.5e-3, 5e-3, 1e-2, 2e-2)
 """Steps in which everything is tested [s]."""
 
-at_all_steps = pytest.mark.parametrize("dt", STEPS)
+at_all_steps = pytest.mark.parametrize("dt", each(STEPS))
 
 
 def margin(exact: float, speed: float, dt: float) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from physics.helpers import GRAVITY, box
-from physics.steps import accepted, on_floor
+from physics.steps import accepted, each, on_floor
 from rigdda import Block
 
 COLUMNS = [(0.2, 0.8), (0.2, 2.0), (0.2, 4.0), (0.2, 8.0), (1.0, 4.0), (0.5, 5.0)]
@@ -60,7 +60,7 @@ def apexes(heights: list[float], speeds: list[float]) -> list[float]:
     return found
 
 
-@pytest.mark.parametrize("dt", accepted(1.0))
+@pytest.mark.parametrize("dt", each(accepted(1.0)))
 @pytest.mark.parametrize("restitution", [0.8, 0.5])
 @pytest.mark.parametrize("first", [0, 2])
 def test_a_square_rebounds_by_the_restitution_time_after_time(restitution, first, dt):
@@ -79,7 +79,7 @@ def test_a_square_rebounds_by_the_restitution_time_after_time(restitution, first
     assert np.abs(sim.poses[0, [0, 2]]).max() < 1e-6
 
 
-@pytest.mark.parametrize("dt", accepted(1.0))
+@pytest.mark.parametrize("dt", each(accepted(1.0)))
 @pytest.mark.parametrize("gap", [0.0, 1e-3, 1e-2, 0.1])
 def test_a_row_of_squares_falls_and_rebounds_as_each_of_them(gap, dt):
     """Three side by side, dropped together, in 2 s: two rebounds."""

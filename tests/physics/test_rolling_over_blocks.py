@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from physics.helpers import ngon, polygon, rock
-from physics.steps import STEPS
+from physics.steps import STEPS, each
 from rigdda import Block, Scene, Settings, Simulation, Terrain
 from rigdda.validation.single_block import wheel
 
@@ -37,7 +37,7 @@ def rolled(sides: int, dt: float, width: float | None = None) -> float:
     return float(np.hypot(*(sim.poses[0, :2] - start)))
 
 
-@pytest.mark.parametrize("dt", STEPS)
+@pytest.mark.parametrize("dt", each(STEPS))
 @pytest.mark.parametrize("sides", [6, 9, 12])
 def test_a_polygon_rolls_over_fixed_blocks_as_mcgeer_says(sides, dt):
     exact = wheel(sides, 1.0, SLOPE, RATE, TIME)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from physics.helpers import box, ngon
-from physics.steps import STEPS, accepted, in_space, mechanical, on_floor
+from physics.steps import STEPS, accepted, each, in_space, mechanical, on_floor
 from rigdda import Block, BodyForce, Scene, Settings, Simulation, Surface, Terrain
 from rigdda.validation.scenes import FLAT
 
 # --- two blocks that meet slowly
 
 
-@pytest.mark.parametrize("dt", STEPS)
+@pytest.mark.parametrize("dt", each(STEPS))
 @pytest.mark.parametrize("speed", [0.1, 0.3, 0.6])
 @pytest.mark.parametrize("where", ["floor", "space", "space with gravity", "pushed apart"])
 def test_slow_blocks_rebound_from_one_another(where, speed, dt):
@@ -60,7 +60,7 @@ def kept(sim: Simulation, time: float) -> float:
     return mechanical(sim) / start
 
 
-@pytest.mark.parametrize("dt", accepted(0.35))
+@pytest.mark.parametrize("dt", each(accepted(0.35)))
 @pytest.mark.parametrize("friction_deg", [0.0, 30.0])
 def test_elastic_central_impacts_of_pairs_keep_the_energy(friction_deg, dt):
     for seed in range(200):
@@ -83,7 +83,7 @@ def off_centre(seed: int) -> tuple[Block, Block]:
     )
 
 
-@pytest.mark.parametrize("dt", accepted(0.325))
+@pytest.mark.parametrize("dt", each(accepted(0.325)))
 def test_smooth_elastic_impacts_off_the_centre_keep_the_energy(dt):
     """Nearly: the rebound is at the end of a substep, and arms change by v dt/8 until then."""
     lost = []
@@ -94,7 +94,7 @@ def test_smooth_elastic_impacts_off_the_centre_keep_the_energy(dt):
     assert np.median(lost) < 0.5 * dt and np.percentile(lost, 95) < 2.5 * dt
 
 
-@pytest.mark.parametrize("dt", accepted(0.49))
+@pytest.mark.parametrize("dt", each(accepted(0.49)))
 def test_a_lone_block_that_lands_flat_or_on_a_corner_rebounds_elastically(dt):
     """Without gravity its speed is reversed; with it, it rises as high as it fell from."""
     for seed in range(60):
@@ -109,7 +109,7 @@ def test_a_lone_block_that_lands_flat_or_on_a_corner_rebounds_elastically(dt):
         assert sim.velocities[0] == pytest.approx((0.0, speed, 0.0), abs=1e-9 * speed), seed
 
 
-@pytest.mark.parametrize("dt", accepted(1.0))
+@pytest.mark.parametrize("dt", each(accepted(1.0)))
 @pytest.mark.parametrize("drop", [0.2, 1.93])
 def test_an_elastic_block_bounces_for_ever(drop, dt):
     """A square dropped flat; 20 s. Where it bounces is raised by the depth of contacts, 0.1 mm."""

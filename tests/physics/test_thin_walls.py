@@ -8,6 +8,7 @@ import shapely
 
 from physics.helpers import FLAT, polygon, rock, rough
 from physics.shapes import SHAPES, overlap, star
+from physics.steps import each
 from rigdda import Block, Scene, Settings, Simulation, Terrain, Wall
 from rigdda.geometry import polygon_properties
 
@@ -42,7 +43,7 @@ def shot(seed: int) -> tuple[Scene, float]:
     return Scene(Terrain(FLAT), (block,), surfaces, (WALL,)), (10.0 - start[0]) / velocity[0]
 
 
-@pytest.mark.parametrize("dt", STEPS)
+@pytest.mark.parametrize("dt", each(STEPS))
 def test_thin_wall_stops_every_shape(dt):
     """200 random blocks: all arrive, none goes deep, none passes."""
     for seed in range(200):

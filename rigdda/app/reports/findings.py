@@ -171,7 +171,7 @@ def of_layout(site: Site, layout: Layout, event: str | None) -> str:
     if event is None and any(isinstance(barrier, Mesh) for barrier in layout):
         words.append(
             "mesh makes events rarer but does not change a release: this command draws events by "
-            "their rates without mesh; `design` and `study` take mesh into account"
+            "their rates without mesh; the commands design and study take mesh into account"
         )
     return "; ".join(words)
 

@@ -254,7 +254,7 @@ EXHIBITS = (
         "worst.csv",
         "The worst releases of the study",
         "Releases with the most energy on the road, and releases in which a barrier fails. "
-        "`rigdda replay` with the event and the seed shows each of them.",
+        "The command rigdda replay shows each of them if it is given the event and the seed.",
         (
             words("layout", "layout"),
             words("why", "why"),

@@ -82,7 +82,7 @@ def sentences(done: Repriced) -> list[str]:
     else:
         line = f"{BEST_OF_SEARCH!r} is {among}, but was not verified: Z is the mean of the "
         line += f"{chosen.releases:,} releases of the search by which it was chosen, and probably "
-        line += "too low; `rigdda design` with site.toml searches and verifies again"
+        line += "too low; the command rigdda design with site.toml searches and verifies again"
     lines = [line]
     lines += findings.over_the_cap(done.problem, cases)
     lines.append(findings.no_layout_pays(done.problem.site, cases))

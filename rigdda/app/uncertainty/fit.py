@@ -662,8 +662,7 @@ def draw(path: Path, fitted: Fit) -> None:
         axes.fill_between(grid, np.clip(share - half, 0, 1), np.clip(share + half, 0, 1),
                           color="#1c5aa0", alpha=0.2, lw=0)  # fmt: skip
         axes.plot(grid, share, color="#1c5aa0", label="computed, 95 % band of samples of this size")
-        axes.step(np.sort(real), np.arange(1, len(real) + 1) / len(real), where="post",
-                  color="#c0392b", label="observed")  # fmt: skip
+        axes.ecdf(real, color="#c0392b", label="observed")
         axes.set(xlabel=_axis(fitted, own[0]), title=f"{name}: {len(real)} observed", ylim=(0, 1))
     figure.axes[0].set_ylabel("share of blocks")
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center",

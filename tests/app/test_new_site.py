@@ -408,15 +408,15 @@ def test_the_new_site_is_not_odd(slope):
         (
             "sources",
             {"band": (95.0, 100.0)},
-            "at x = 95 to 100 m, 100 % of it, the ground is 9 deg steep, less than its friction "
-            "angle of 32 deg",
+            "at x = 95 to 100 m, 100 % of it, the ground is 8.5 deg steep, less than its "
+            "friction angle of 32 deg",
         ),
-        ("sources", {"band": (5.0, 25.0)}, "at x = 5 to 10 m, 25 % of it, the ground is 11 deg"),
+        ("sources", {"band": (5.0, 25.0)}, "at x = 5 to 10 m, 25 % of it, the ground is 11.3 deg"),
         (
             "sources",
             {"band": (5.0, 99.0)},
-            "at x = 5 to 10 and 72 to 99 m, 34 % of it, the ground is 9 to 32 deg steep, less than "
-            "its friction angle of 32 to 35 deg",
+            "at x = 5 to 10 and 72 to 99 m, 34 % of it, the ground is 8.5 to 32.5 deg steep, less "
+            "than its friction angle of 32 to 35 deg",
         ),
         ("events", {"rate": 30.0}, "events.block, face.rate = 30: this makes 30 events a year"),
         ("events", {"rate": 30.0}, "return_period = 30"),

@@ -17,6 +17,7 @@ from rigdda.app.page.barriers_tab import shown, ways
 from rigdda.app.page.falls import Fall, Release
 from rigdda.app.page.forms import Bound, button, heading, in_words, paragraph, table, text
 from rigdda.app.page.ground import Compared, Match, Observations
+from rigdda.app.page.handles import surface_words
 from rigdda.app.page.jobs import CANCELLED, FAILED, FINISHED, INTERRUPTED, RUNNING
 from rigdda.app.page.locking import watch
 from rigdda.app.page.section import Section, plain_axes
@@ -197,13 +198,14 @@ class GroundTab:
     def _build(self, site: Site) -> None:
         """Build the sliders of the grounds anew, for a site with other grounds than before."""
         self._bound = []
-        labels = {f"{_field(p)} of {_surface_words(p)}": p for p in self._parameters}
+        labels = {f"{_field(p)} of {surface_words(_surface(p))}": p for p in self._parameters}
         self._fitted.options = labels
         self._fitted.value = [p for p in labels.values() if p.endswith(".rolling")][:1]
         rows: list[Any] = [heading("Grounds, within the ranges of the library")]
         for path, one in self._parameters.items():
             widget = pn.widgets.EditableFloatSlider(
-                label=f"{_label(path)}, {_surface_words(path)}", start=one.low, end=one.high,
+                label=f"{_label(path)}, {surface_words(_surface(path))}",
+                start=one.low, end=one.high,
                 step=(one.high - one.low) / STEPS, width=WIDE - 60, margin=(2, 8),
             )  # fmt: skip
             get = partial(self._value, path)
@@ -215,7 +217,7 @@ class GroundTab:
         return float(getattr(self.project.site.surfaces[_surface(path)], path.split(".")[-1]))
 
     def _change(self, path: str, value: float) -> None:
-        words = f"set {_field(path)} of {_surface_words(path)}"
+        words = f"set {_field(path)} of {surface_words(_surface(path))}"
         place = tuple(path.split("."))
         self.page.act(lambda: self.project.set_value(place, round(float(value), 6), words))
 
@@ -382,11 +384,6 @@ class GroundTab:
 def _surface(path: str) -> str:
     """Return the name of the surface of a number of the ground."""
     return path.split(".")[1]
-
-
-def _surface_words(path: str) -> str:
-    """Return the name of the surface of a number of the ground in words."""
-    return _surface(path).replace("_", " ")
 
 
 def _field(path: str) -> str:

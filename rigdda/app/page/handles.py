@@ -67,15 +67,17 @@ def _stretch_ends(site: Site) -> list[tuple[str, float, tuple[Path, ...]]]:
         own, path = stretches[i], ("slope", "surfaces", i)
         before = stretches[order[place - 1]] if place else None
         if before is None or before.end != own.start:
-            found.append((f"start of {_words(own.surface)}", own.start, ((*path, "start"),)))
+            found.append((f"start of {surface_words(own.surface)}", own.start, ((*path, "start"),)))
         after = stretches[order[place + 1]] if place + 1 < len(order) else None
         if after is not None and after.start == own.end:
             both = ((*path, "end"), ("slope", "surfaces", order[place + 1], "start"))
-            found.append((f"{_words(own.surface)} to {_words(after.surface)}", own.end, both))
+            words = f"{surface_words(own.surface)} to {surface_words(after.surface)}"
+            found.append((words, own.end, both))
         else:
-            found.append((f"end of {_words(own.surface)}", own.end, ((*path, "end"),)))
+            found.append((f"end of {surface_words(own.surface)}", own.end, ((*path, "end"),)))
     return found
 
 
-def _words(surface: str) -> str:
+def surface_words(surface: str) -> str:
+    """Return the name of a surface in words, such as "hard rock" for "hard_rock"."""
     return surface.replace("_", " ")

@@ -247,6 +247,38 @@ def test_a_disc_stays_on_a_slope_below_the_limit_of_rolling(rolling, dt):
     assert rolled(sides, 1.1 * limit, 0.0, 5.0, rolling, dt)[0] > 0.5
 
 
+# --- grounds with and without resistance
+
+
+@pytest.mark.parametrize("before, after", [(0.3, 0.0), (0.0, 0.3), (0.3, 0.1)])
+@pytest.mark.parametrize("pair", [False, True], ids=["one block", "two blocks"])
+@pytest.mark.parametrize("dt", each(accepted(1.0)))
+def test_a_block_that_changes_the_ground_comes_to_rest(before, after, pair, dt):
+    """A block slides v^2 / (2 g tan phi) from one ground to another, and then rests.
+
+    The contacts take over the impulses of the first ground. A rolling impulse that the second one
+    does not limit would grow without bound. Two blocks are an island of several substeps.
+    """
+    friction, speed, rest = 20.0, 3.0, 5.0
+    surfaces = {
+        "soil": Surface(friction_deg=friction, restitution=0.0, rolling=before),
+        "rock": Surface(friction_deg=friction, restitution=0.0, rolling=after),
+    }
+    ground = Terrain([(-20.0, 0.0), (0.0, 0.0), (20.0, 0.0)], ["soil", "rock"])
+    blocks = [box(-0.6, 0.5, surface="soil", velocity=(speed, 0.0, 0.0))]
+    if pair:
+        blocks.append(box(-1.6, 0.5, surface="soil", velocity=(speed, 0.0, 0.0)))
+    scene = Scene(ground, blocks, surfaces)
+    sim = Simulation(scene, Settings(dt=dt, sleeping=False))
+    sim.step(round(rest / dt))
+    way = speed**2 / (2.0 * GRAVITY * math.tan(math.radians(friction)))
+    assert sim.poses[0, 0] == pytest.approx(-0.6 + way, abs=speed * dt + 0.005)
+    assert np.abs(sim.velocities).max() < 1e-6
+    ends = sim.loop.contacts
+    most = ends["rolling"] * ends["accumulated_normal"]
+    assert (np.abs(ends["accumulated_roll"]) <= most + 1e-6).all()
+
+
 # --- energy
 
 

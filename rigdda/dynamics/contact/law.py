@@ -200,6 +200,8 @@ def set_properties(bodies: Bodies, c: Contact, interfaces: Interfaces, p: Parame
         c.bond = 0.0
     if c.bond > 0.0:
         c.rolling = 0.0  # the ends of an unbroken joint bear its moment
+    if c.rolling == 0.0:  # the impulse may be that of a surface on which the contact was before
+        c.accumulated_roll = 0.0
     c.radius = rolling_radius(bodies, c) if c.rolling > 0.0 else 0.0
     c.kind = PLAIN if c.restitution == PLAIN_CONTACT else REST
 

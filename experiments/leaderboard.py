@@ -30,8 +30,12 @@ from rigdda.app.exam.scorer import Scorer
 from rigdda.app.exam.specification import ExamPart
 
 MODULE = "rigdda.app.exam.entries"
+"""Module of the entries for the methods of the package."""
 
-STILL = ("nothing", "constant", "engineering_rule", "random_layout")
+ELSEWHERE = {"ppo": "experiments.exam_ppo:design"}
+"""Entries of other modules by their name in the table."""
+
+STILL = ("nothing", "constant", "engineering_rule", "random_layout", "ppo")
 """Entries that do not search."""
 
 SEARCHES = ("value", "policy", "race", "random_search", "cma", "tpe", "convex")
@@ -68,13 +72,18 @@ def entries(budget: int) -> Sequence[str]:
     return SEARCHES if budget else STILL
 
 
+def entry_of(name: str) -> str:
+    """Return the module and function of an entry."""
+    return ELSEWHERE.get(name, f"{MODULE}:{name}")
+
+
 def exam_of(name: str, part: ExamPart, work: Path) -> Scorer:
     """Return the scorer of an entry, whose layouts are submitted."""
     spec = specification.load()
     references = specification.references(spec)
     own = work / name
     own.mkdir(parents=True, exist_ok=True)
-    job = Scorer(part, references, f"{MODULE}:{name}", "", own)
+    job = Scorer(part, references, entry_of(name), "", own)
     job.play()
     return job
 
@@ -83,7 +92,7 @@ def rows_of(name: str, job: Scorer) -> list[dict[str, Any]]:
     """Return the rows of an entry."""
     specification.check_references(job.asked, job.references)
     budget = job.asked.budgets[0]
-    command = f"rigdda exam --entry {MODULE}:{name} --budget {budget}"
+    command = f"rigdda exam --entry {entry_of(name)} --budget {budget}"
     return [
         {"entry": name, **{key: row[key] for key in KEPT}, "command": command}
         for row in ranking.summary(job.verify(), job.asked, name)

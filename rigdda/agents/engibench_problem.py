@@ -25,7 +25,7 @@ from rigdda.agents import designers
 from rigdda.envs import DesignProblem
 from rigdda.seeds import release_seeds
 
-DEFAULT_SITE = "narrow-2000000003"
+DEFAULT_SITE = "wide-narrow-2000000003"
 """Site of a problem without a configuration: the cheapest family to simulate."""
 
 

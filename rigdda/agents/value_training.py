@@ -29,7 +29,7 @@ from rigdda.agents.run_record import check_terms
 from rigdda.envs import DesignProblem
 from rigdda.envs.envelope import largest
 from rigdda.files import atomic
-from rigdda.model.site_names import TRAINING_SPLIT
+from rigdda.model.site_names import VALUE_SPLIT
 from rigdda.seeds import release_seeds
 
 Floats = NDArray[np.float64]
@@ -73,7 +73,7 @@ class ValueTerms:
     seed: int
 
     def __post_init__(self) -> None:
-        check.integer("sites", self.sites, 2, len(sites.split(TRAINING_SPLIT)))
+        check.integer("sites", self.sites, 2, len(sites.split(VALUE_SPLIT)))
         check.integer("seed", self.seed, 0, limits.SEED)
 
 
@@ -129,7 +129,7 @@ def train(terms: ValueTerms, out: Path, tick: Tick) -> Network:
     """
     _agree(terms, out)
     found = []
-    for i, name in enumerate(sites.split(TRAINING_SPLIT)[: terms.sites]):
+    for i, name in enumerate(sites.split(VALUE_SPLIT)[: terms.sites]):
         tick(i, name)
         path = out / f"{name}.npz"
         if not path.is_file():

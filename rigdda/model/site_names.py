@@ -11,8 +11,8 @@ from rigdda.errors import BadInput
 FAMILIES = ("verge", "bench", "talus", "narrow", "cliff", "shu-hwa")
 """Families of design sites, each named after its built-in site."""
 
-TRAINING_SPLIT = "train"
-"""Split that the value network and the agent of corridors are trained on."""
+VALUE_SPLIT, CORRIDOR_SPLIT = "wide-train", "train"
+"""Splits on which the value network and the agent for corridors are trained."""
 
 WIDE_FAMILIES = (
     "verge", "bench", "talus", "narrow", "cliff", "slab-cut", "forest", "terrace", "old-fence",

@@ -12,7 +12,7 @@ from rigdda.app.exam import entries
 from rigdda.app.exam.ask_tell import AskTell
 from rigdda.app.exam.counter import practice
 
-SITE = "narrow-2000000003"
+SITE = "wide-narrow-2000000003"
 
 
 def test_search_stays_within_the_budget_and_its_layouts_may_be_built() -> None:

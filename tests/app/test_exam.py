@@ -22,7 +22,7 @@ from rigdda.app.exam.specification import Anchor, References, tables
 from rigdda.envs import DesignProblem
 from rigdda.model.site_names import NUMBERS, instance
 
-SITES = ("narrow-2000000003", "cliff-2000000004")
+SITES = ("wide-narrow-2000000003", "wide-cliff-2000000004")
 
 SPEC = f"""
 version = 7
@@ -32,12 +32,12 @@ verification = 40
 max_barriers = 2
 references = "references.json"
 reference_releases = 2000
-sites = ["narrow-2000000003", "cliff-2000000004"]
+sites = ["wide-narrow-2000000003", "wide-cliff-2000000004"]
 
 [[corridors]]
 name = "road"
 money = 400.0
-sites = ["narrow-2000000003", "cliff-2000000004"]
+sites = ["wide-narrow-2000000003", "wide-cliff-2000000004"]
 lengths = [10.0, 30.0]
 """
 
@@ -137,18 +137,18 @@ def read(file: Path) -> list[dict[str, str]]:
 def test_no_split_contains_a_site_of_the_exam() -> None:
     asked = specification.load()
     names = [*asked.sites, *(site for road in asked.corridors for site in road.sites)]
-    assert len(asked.sites) == 24 and len(asked.corridors) == 3
-    assert len(set(names)) == len(names) == 36
+    assert len(asked.sites) == 27 and len(asked.corridors) == 3
+    assert len(set(names)) == len(names) == 39
     for name in names:
         family, number, wide = instance(name)
-        assert family in sites.FAMILIES and not wide
+        assert family in sites.WIDE_FAMILIES and wide
         assert not any(number in numbers for numbers in NUMBERS.values())
 
 
 def test_every_task_of_the_exam_has_a_reference_that_may_be_built() -> None:
     asked = specification.load()
     known, whole = specification.references(asked), specification.part(asked)
-    assert whole.size == 4 * 27 and whole.complete is asked.current
+    assert whole.size == 4 * 30 and whole.complete is asked.current
     specification.check_references(whole, known)
     assert set(known.anchors) == {order.name for order in whole.orders(0)}
     for order in whole.orders(0):

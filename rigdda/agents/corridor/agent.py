@@ -32,7 +32,7 @@ from rigdda.agents.designers.race import forecasts_of, single_barriers
 from rigdda.agents.network import Network
 from rigdda.envs import DesignProblem
 from rigdda.envs.corridor_environment import CorridorDesign
-from rigdda.model.site_names import TRAINING_SPLIT
+from rigdda.model.site_names import CORRIDOR_SPLIT
 
 Floats = NDArray[np.float64]
 
@@ -176,7 +176,7 @@ def train(count: int, seed: int, out: Path, tick: Callable[[int, str], None]) ->
     Diverged
         If a simulation diverges.
     """
-    names = sites.split(TRAINING_SPLIT)
+    names = sites.split(CORRIDOR_SPLIT)
     check.integer("sites", count, 2, len(names))
     check.integer("seed", seed, 0, limits.SEED)
     chosen = np.random.default_rng(seed).choice(len(names), count, replace=False)

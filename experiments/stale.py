@@ -16,6 +16,8 @@ from experiments.made_by import MADE_BY, made_by
 from experiments.script import RESULTS
 from rigdda import MECHANICS
 from rigdda.agents.designers import policy
+from rigdda.agents.designers.forecast import NETWORK_FILE as VALUE_NETWORK
+from rigdda.agents.network import Network
 from rigdda.app.exam import specification
 from rigdda.envs import forecast_table, site_store
 
@@ -41,6 +43,9 @@ def stale_package() -> Iterator[tuple[str, str]]:
     made = forecast_table.load().notes.get("mechanics", UNKNOWN)
     if made != MECHANICS:
         yield "table of forecasts (experiments.known_forecasts)", made
+    made = Network.load(VALUE_NETWORK).notes.get("mechanics", UNKNOWN)
+    if made != MECHANICS:
+        yield "value network (rigdda train --model value)", made
     made = policy.load().network.notes.get("mechanics", UNKNOWN)
     if made != MECHANICS:
         yield "policy (rigdda train, see experiments.known_forecasts)", made

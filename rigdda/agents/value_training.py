@@ -136,7 +136,8 @@ def train(terms: ValueTerms, out: Path, tick: Tick) -> Network:
             collect(DesignProblem(name), np.random.default_rng([terms.seed, i])).save(path)
         found.append(Samples.load(path))
     command = f"rigdda train --model value --sites {terms.sites} --seed {terms.seed}"
-    network = fit(found, terms.seed, {"command": command, "version": __version__})
+    notes = {"command": command, "version": __version__, "mechanics": MECHANICS}
+    network = fit(found, terms.seed, notes)
     network.save(out / "value.safetensors")
     return network
 

@@ -6,8 +6,8 @@ forecasts and without the value network, for H hours of processor time (2 by def
 episode and the sites `TRAINED_ON`. The releases without barriers that the observations of these
 sites need are included in the time.
 
-Writes exam/ppo.zip, the model, and exam/ppo.csv, the mean reward of the episodes in the course of
-the training. An interrupted training continues from the folder runs/exam_ppo. The entry of the exam
+Writes exam/ppo.zip, the model, and exam/ppo.csv and exam/ppo.png, the mean reward of the episodes in
+the course of the training. An interrupted training continues from the folder runs/exam_ppo. The entry of the exam
 is `experiments.exam_ppo:design`; it simulates no releases.
 """
 
@@ -22,12 +22,13 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from experiments.script import RESULTS, say, write
+from experiments.script import BLUE, RESULTS, draw, say, write
 from rigdda import Layout, sites
 from rigdda.envs import DesignProblem, sb3_vec_env
 from rigdda.files import atomic
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from stable_baselines3 import PPO
 
     from rigdda.app.exam.task import Task
@@ -128,6 +129,18 @@ def design(task: Task) -> Layout:
     return layout if task.problem.fits(layout) else ()
 
 
+def draw_course(path: Path, course: Sequence[dict[str, float]]) -> None:
+    """Draw the mean reward of the episodes of each update against processor time."""
+
+    def paint(sheet: Figure) -> None:
+        axes = sheet.subplots()
+        minutes = [row["processor_s"] / 60.0 for row in course]
+        axes.plot(minutes, [row["reward"] for row in course], color=BLUE)
+        axes.set(xlabel="processor time [min]", ylabel="mean reward of an update [-]")
+
+    draw(path, (7.0, 3.5), paint)
+
+
 @click.command(help=__doc__)
 @click.option("--hours", type=click.FloatRange(0.0, min_open=True), default=2.0, show_default=True,
               help="Processor time of the training.")  # fmt: skip
@@ -141,6 +154,7 @@ def main(hours: float, out: Path) -> None:
     with atomic(path) as part, part.open("wb") as file:
         model.save(file)
     write(out / "exam" / "ppo.csv", course)
+    draw_course(out / "exam" / "ppo.png", course)
     last = float(np.mean([row["reward"] for row in course[-20:]]))
     click.echo(
         f"{course[-1]['episodes']:,.0f} episodes; mean reward of the last updates {last:.3f}"

@@ -6,9 +6,9 @@ forecasts and without the value network, for H hours of processor time (2 by def
 episode and the sites `TRAINED_ON`. The releases without barriers that the observations of these
 sites need are included in the time.
 
-Writes exam/ppo.zip, the model, and exam/ppo.csv and exam/ppo.png, the mean reward of the episodes in
-the course of the training. An interrupted training continues from the folder runs/exam_ppo. The entry of the exam
-is `experiments.exam_ppo:design`; it simulates no releases.
+Writes exam/ppo.zip, the model, and exam/ppo.csv and exam/ppo.png, the mean reward of the episodes
+in the course of the training. An interrupted training continues from the folder runs/exam_ppo. The
+entry of the exam is `experiments.exam_ppo:design`; it simulates no releases.
 """
 
 from __future__ import annotations

@@ -123,7 +123,7 @@ def stability(jobs: dict[tuple[str, int], Scorer]) -> tuple[float, list[dict[str
     Entries are compared on the sites at the same budget, those without a search at each. The rows
     contain each pair with the mean difference of its scores on both sets of releases.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for budget in sorted({own for _, own in jobs} - {0}):
         names = [key for key in jobs if key[1] in (0, budget)]
         say(f"{budget:,} releases: second set of releases")

@@ -27,7 +27,7 @@ from rigdda.agents import limits
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.forecast import NETWORK_FILE as VALUE_NETWORK
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.policy import Policy, decide
+from rigdda.agents.designers.policy import Policy, decide, prior
 from rigdda.agents.designers.protocol import verify
 from rigdda.agents.designers.rule import answer
 from rigdda.agents.designers.store import Store
@@ -197,6 +197,7 @@ def learn(
     bare = Network(*scaling(given[mask]), [], notes)
     torch.set_num_threads(1)
     features = torch.tensor(scaled(given, bare.mean, bare.scale))
+    score, built = torch.tensor(prior(given)), torch.tensor(mask)
     members = []
     for k in range(MEMBERS):
         seed = MEMBERS * terms.seed + k
@@ -206,12 +207,10 @@ def learn(
         if terms.algorithm == "ppo":
             ppo.learn(member, table, bare, seed, one)
         else:
-            exact_gradient.learn(member, features, torch.tensor(mask), reward, seed, one)
+            exact_gradient.learn(member, features, score, built, reward, seed, one)
         if z is not None:
             reward = torch.tensor(np.where(mask, 1.0 - z, 0.0), dtype=torch.float32)
-            exact_gradient.learn(
-                member, features, torch.tensor(mask), reward, seed, one, clone=False
-            )
+            exact_gradient.learn(member, features, score, built, reward, seed, one)
         members.append(member)
     return pointer.export(members, bare.mean, bare.scale, notes)
 

@@ -96,7 +96,7 @@ def test_a_training_of_the_value_network_continues(
     terms = value_training.ValueTerms(2, 3)
     first = value_training.train(terms, tmp_path, lambda *_: None)
     assert first.sizes == [LAYOUT_FEATURES, 128, 128, 4] and first.finite
-    (tmp_path / "random-1.npz").unlink()
+    (tmp_path / "wide-1.npz").unlink()
     again = value_training.train(terms, tmp_path, lambda *_: None)
     saved = Network.load(tmp_path / "value.safetensors")
     for (one, _), (two, _) in zip(first.layers, again.layers, strict=True):

@@ -28,8 +28,9 @@ def table(monkeypatch: pytest.MonkeyPatch) -> ForecastTable:
     rng = np.random.default_rng(3)
     names = (*sites.split("train")[:30], *sites.split("validation")[:10])
     features = np.zeros((40, 6, FEATURES), np.float32)
-    features[..., :3] = rng.normal(size=(40, 6, 3))
-    features[:, 0, :3] = 3.0  # no barrier
+    features[..., :2] = rng.normal(size=(40, 6, 2))
+    features[:, 0, :2] = 3.0  # no barrier
+    features[..., forecasts.FORECAST_Z] = 0.5  # forecasts that do not distinguish layouts
     z = 0.5 + 0.2 * np.tanh(features[..., 0] + features[..., 1])
     z[:, 0] = 1.0
     z[rng.random(z.shape) < 0.2] = np.nan
@@ -214,7 +215,26 @@ def test_a_network_of_members_gives_the_scores_of_each() -> None:
     made = pointer.export(members, zeros, ones, {})
     assert isinstance(made, Network) and made.sizes[-1] == 3
     seen = np.random.default_rng(0).uniform(-1, 1, (4, FEATURES)).astype(np.float32)
-    mask = torch.ones(4, dtype=torch.bool)
+    mask, prior = torch.ones(4, dtype=torch.bool), torch.zeros(4)
     for k, member in enumerate(members):
-        said = member(torch.tensor(seen), mask).detach().numpy()
+        said = member(torch.tensor(seen), prior, mask).detach().numpy()
         np.testing.assert_allclose(made(seen)[:, k], said, atol=1e-5)
+    with torch.no_grad():
+        for member in members:
+            member.last.weight += 1.0
+    made = pointer.export(members, zeros, ones, {})
+    said = members[1](torch.tensor(seen), prior, mask).detach().numpy()
+    np.testing.assert_allclose(made(seen)[:, 1], said, atol=1e-4)
+
+
+def test_an_untrained_policy_follows_the_forecasts(table: ForecastTable) -> None:
+    """The corrections are zero before the training, so that the least forecast Z is chosen."""
+    pytest.importorskip("torch")
+    from rigdda.agents.learning import pointer
+
+    zeros, ones = np.zeros(FEATURES, np.float32), np.ones(FEATURES, np.float32)
+    network = pointer.export([pointer.Pointer(FEATURES, 0)], zeros, ones, {})
+    features = np.random.default_rng(1).uniform(-1, 1, (40, len(LAYOUTS), FEATURES))
+    features[..., forecasts.FORECAST_Z] = np.nan_to_num(table.z)
+    least = np.where(table.mask, table.z, np.inf).argmin(axis=1)
+    assert (Policy(network, LAYOUTS).choose(features, table.mask) == least).all()

@@ -1,9 +1,9 @@
 """A trained policy, which chooses a layout from a catalogue of relative layouts without a search.
 
-A small neural network scores each layout of the catalogue on a site from the features of its
-forecast (`rigdda.agents.learning.forecasts`), and the layout with the highest score is built. The
-network is evaluated with numpy and stored in a safetensors file together with the catalogue.
-`rigdda train` makes such a file, and one ships with the package.
+The score of each layout of the catalogue is its forecast Z (`prior`), corrected by a small neural
+network that sees the features of the forecast (`rigdda.agents.learning.forecasts`). The layout with
+the highest score is built. The network is evaluated with numpy and stored in a safetensors file
+together with the catalogue. `rigdda train` makes such a file, and one ships with the package.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble_for
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import Designer, DesignResult, Ledger, Progress
 from rigdda.agents.designers.store import Store
-from rigdda.agents.learning.forecasts import FEATURES, of_site
+from rigdda.agents.learning.forecasts import FEATURES, FORECAST_Z, of_site
 from rigdda.agents.learning.relative_layouts import NOTHING
 from rigdda.agents.network import Network
 from rigdda.envs import DesignProblem
@@ -34,8 +34,18 @@ FINAL = 64
 SHIPPED = Path(__file__).parent / "policy.safetensors"
 """The policy that ships with the package, which `design` uses."""
 
-LAYOUTS = "layouts"
+TEMPERATURE = 0.05
+"""Difference of two forecasts of Z over Z without barriers that changes the logarithm of the ratio
+of their probabilities by one [-], about the error of a forecast."""
+
+LAYOUTS = "catalogue"
 """Key of the catalogue in the notes of the network of a policy."""
+
+
+def prior(features: NDArray[Any]) -> NDArray[np.float32]:
+    """Return the score of each layout by its forecast alone from (..., A, F) features, (..., A)."""
+    score: NDArray[np.float32] = (features[..., FORECAST_Z] / -TEMPERATURE).astype(np.float32)
+    return score
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +55,7 @@ class Policy:
     Parameters
     ----------
     network : Network
-        Network from the features of a layout to its score; the mean of its outputs is the score.
+        Network from the features of a layout to corrections of `prior`, which are averaged.
     layouts : tuple of A str
         The relative layouts as JSON.
     """
@@ -56,7 +66,7 @@ class Policy:
     def scores(self, features: NDArray[Any]) -> NDArray[np.float64]:
         """Return the score of each layout from (..., A, F) features, (..., A)."""
         found: NDArray[np.float64] = self.network(features.astype(np.float32)).mean(axis=-1)
-        return found
+        return prior(features) + found
 
     def choose(self, features: NDArray[Any], mask: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return the number of the best layout for (..., A, F) features and a (..., A) mask."""

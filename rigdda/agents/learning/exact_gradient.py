@@ -17,10 +17,8 @@ import torch
 
 from rigdda.agents.learning.pointer import Pointer
 
-CLONE, STEPS = 200, 400
-"""Number of steps of imitating the forecasts, and of ascent."""
-TEMPERATURE = 0.05
-"""Temperature of the forecast probabilities that are imitated first [-]."""
+STEPS = 400
+"""Number of steps."""
 RATE, DECAY, JITTER, ENTROPY = 3e-3, 0.01, 0.1, 0.01
 """Learning rate, which falls linearly to 0, weight decay, standard deviation of the noise added to
 scaled features, and weight of the entropy."""
@@ -29,11 +27,11 @@ scaled features, and weight of the entropy."""
 def learn(
     policy: Pointer,
     features: torch.Tensor,
+    prior: torch.Tensor,
     mask: torch.Tensor,
     reward: torch.Tensor,
     seed: int,
     tick: Callable[[], None],
-    clone: bool = True,
 ) -> None:
     """Train a policy on a table.
 
@@ -43,6 +41,8 @@ def learn(
         The policy, which is changed.
     features : (S, A, F) tensor
         Scaled features.
+    prior : (S, A) tensor
+        Scores by the forecast.
     mask : (S, A) tensor of bool
         Layouts that can be built.
     reward : (S, A) tensor
@@ -51,26 +51,17 @@ def learn(
         Seed of the noise.
     tick : callable
         Called after every step.
-    clone : bool
-        Whether the policy first imitates a softmax of the rewards. The ascent then starts from a
-        policy that finds good layouts on every site and does not yet prefer a single one.
     """
     generator = torch.Generator().manual_seed(seed)
     optimiser = torch.optim.AdamW(policy.parameters(), lr=RATE, weight_decay=DECAY)
-    wanted = (reward / TEMPERATURE).masked_fill(~mask, -torch.inf).softmax(dim=1)
-    total = STEPS + CLONE * clone
-    for step in range(total):
-        optimiser.param_groups[0]["lr"] = RATE * (1.0 - step / total)
+    for step in range(STEPS):
+        optimiser.param_groups[0]["lr"] = RATE * (1.0 - step / STEPS)
         noise = JITTER * torch.randn(features.shape, generator=generator)
-        logp = policy(features + noise, mask).log_softmax(dim=1).masked_fill(~mask, 0.0)
+        logp = policy(features + noise, prior, mask).log_softmax(dim=1).masked_fill(~mask, 0.0)
         chance = logp.exp() * mask
-        if clone and step < CLONE:
-            loss = -(wanted * logp).sum(dim=1).mean()
-        else:
-            expected = (chance * reward).sum(dim=1).mean()
-            entropy = -(chance * logp).sum(dim=1).mean()
-            loss = -expected - ENTROPY * entropy
+        expected = (chance * reward).sum(dim=1).mean()
+        entropy = -(chance * logp).sum(dim=1).mean()
         optimiser.zero_grad()
-        loss.backward()
+        (-expected - ENTROPY * entropy).backward()
         optimiser.step()
         tick()

@@ -35,6 +35,9 @@ the forecast Z, each over Z without barriers, and the mean over the events of th
 value network. An event has the weight of its share of the risk without barriers. Features are
 limited to `BOUND`."""
 
+FORECAST_Z = 2
+"""Number of the feature that is the forecast Z over Z without barriers."""
+
 SOFT = 0.05
 """Scale of the soft minimum by which a catalogue is chosen [-], about the error of a forecast."""
 

@@ -2,7 +2,9 @@
 
 The same small network scores every layout, so that it does not matter how many layouts there are,
 in which order, or on which site (Vinyals et al. 2015, arXiv:1506.03134, choose among inputs in this
-way). Several members that were trained with different seeds are averaged.
+way). It is added to the score by the forecast (`rigdda.agents.designers.policy.prior`) and is zero
+before the training, which therefore begins with a policy that follows the forecasts. Several
+members that were trained with different seeds are averaged.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ HIDDEN = 64
 
 
 class Pointer(torch.nn.Module):
-    """Network from (..., A, F) scaled features and a (..., A) mask to (..., A) logits.
+    """Network from (..., A, F) scaled features to the logits of a policy.
 
     Parameters
     ----------
@@ -46,16 +48,29 @@ class Pointer(torch.nn.Module):
             bound = float(layer.in_features) ** -0.5
             torch.nn.init.uniform_(layer.weight, -bound, bound, generator=generator)
             torch.nn.init.zeros_(layer.bias)
+        torch.nn.init.zeros_(self.last.weight)
 
     @property
     def layers(self) -> tuple[torch.nn.Linear, ...]:
         """The linear layers."""
         return self.first, self.second, self.last
 
-    def forward(self, features: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
-        """Return the logits; those of layouts that cannot be built are minus infinity."""
+    def forward(
+        self, features: torch.Tensor, prior: torch.Tensor, mask: torch.Tensor
+    ) -> torch.Tensor:
+        """Return the (..., A) logits; those of layouts that cannot be built are minus infinity.
+
+        Parameters
+        ----------
+        features : (..., A, F) tensor
+            Scaled features.
+        prior : (..., A) tensor
+            Scores by the forecast.
+        mask : (..., A) tensor of bool
+            Layouts that can be built.
+        """
         values = torch.tanh(self.second(torch.tanh(self.first(features))))
-        scores: torch.Tensor = self.last(values)[..., 0]
+        scores: torch.Tensor = prior + self.last(values)[..., 0]
         return scores.masked_fill(~mask, -torch.inf)
 
 

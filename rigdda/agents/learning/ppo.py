@@ -14,6 +14,7 @@ import gymnasium
 import numpy as np
 import torch
 
+from rigdda.agents.designers.policy import prior
 from rigdda.agents.learning.pointer import Pointer
 from rigdda.agents.network import Network, scaled
 from rigdda.envs.forecast_table import ForecastTable
@@ -55,9 +56,10 @@ def learn(
         optimiser.param_groups[0]["lr"] = RATE * (1.0 - iteration / ITERATIONS)
         given = seen["layouts"].reshape(BATCH, len(table.layouts), -1)
         features = torch.tensor(scaled(given, scaling.mean, scaling.scale))
+        score = torch.tensor(prior(given))
         mask, names = torch.tensor(infos["action_mask"] > 0), infos["site"]
         with torch.no_grad():
-            before = policy(features, mask).log_softmax(dim=1)
+            before = policy(features, score, mask).log_softmax(dim=1)
             actions = torch.multinomial(before.exp(), 1, generator=generator)[:, 0]
             before = before.gather(1, actions[:, None])[:, 0]
         seen, rewards, _, _, infos = env.step(actions.numpy())
@@ -68,7 +70,7 @@ def learn(
             baseline[name] += RECENT * (reward - baseline[name])
         for _ in range(EPOCHS):
             for part in torch.randperm(BATCH, generator=generator).chunk(PARTS):
-                logp = policy(features[part], mask[part]).log_softmax(dim=1)
+                logp = policy(features[part], score[part], mask[part]).log_softmax(dim=1)
                 ratio = (logp.gather(1, actions[part, None])[:, 0] - before[part]).exp()
                 bounded = ratio.clamp(1.0 - CLIP, 1.0 + CLIP)
                 gain = torch.minimum(ratio * advantage[part], bounded * advantage[part]).mean()

@@ -11,7 +11,6 @@ Writes designers.csv, one row per search, and designers.png. An interrupted run 
 
 from __future__ import annotations
 
-import csv
 import statistics
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments import reference
+from experiments.made_with import MADE_WITH, resumed
 from experiments.script import (
     BLUE,
     GREEN,
@@ -33,7 +33,7 @@ from experiments.script import (
     say,
     write,
 )
-from rigdda import MECHANICS, BadInput, Layout, sites
+from rigdda import BadInput, Layout, sites
 from rigdda.agents import designers
 from rigdda.agents.designers.protocol import verify
 from rigdda.agents.designers.store import Store
@@ -111,7 +111,7 @@ class Contest:
             "reported_low": found.evaluation.ci[0], "reported_high": found.evaluation.ci[1],
             "z_reference": least.objective, "z_nothing": nothing.objective,
             "distance": (e.objective - least.objective) / gain, "origin": found.origin,
-            "on_bound": "; ".join(found.on_bound), "mechanics": MECHANICS,
+            "on_bound": "; ".join(found.on_bound), **MADE_WITH,
             "layout": "; ".join(map(describe, found.layout)),
         }  # fmt: skip
 
@@ -145,21 +145,13 @@ def picture(figure: Figure, rows: list[Any]) -> None:
         axes.set_visible(False)
 
 
-def load(path: Path) -> list[dict[str, str]]:
-    """Return the rows of an earlier run that were made by the current mechanics."""
-    if not path.is_file():
-        return []
-    with path.open(newline="", encoding="utf-8") as file:
-        return [r for r in csv.DictReader(file) if r["mechanics"] == MECHANICS]
-
-
 def run(quick: bool, out: Path) -> Number:
     """Write designers.csv and designers.png."""
     path = out / "reference.csv"
     recorded = reference.load(path) or reference.load(RESULTS / "reference.csv")
     if not recorded:
         raise BadInput("reference", str(path), "run python -m experiments.reference first")
-    rows: list[Any] = load(out / "designers.csv")
+    rows: list[Any] = resumed(out / "designers.csv")
     known = {(r["site"], r["designer"], int(r["budget"]), int(r["seed"])) for r in rows}
     contests: dict[str, Contest] = {}
     for seed, budget, name in cases(quick):

@@ -17,6 +17,7 @@ from pathlib import Path
 import click
 import numpy as np
 
+from experiments.made_with import VALUE_NETWORK
 from experiments.script import say
 from rigdda import MECHANICS, sites
 from rigdda.agents.learning import forecasts
@@ -30,8 +31,8 @@ WORK = Path("runs/known_forecasts")
 
 
 def folder_of(work: Path) -> Path:
-    """Return the folder for forecasts of this version of the mechanics, which is created."""
-    folder = work / f"mechanics-{MECHANICS}"
+    """Return the folder for forecasts with the present networks and mechanics; it is created."""
+    folder = work / f"mechanics-{MECHANICS}-{VALUE_NETWORK}"
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 

@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.made_with import MADE_WITH, resumed
 from experiments.script import Number, interval, main, say, write
-from experiments.search_gain import FRESH, QUICK_VERIFY, VERIFY, load, problems_of
-from rigdda import MECHANICS, Layout, sites
+from experiments.search_gain import FRESH, QUICK_VERIFY, VERIFY, problems_of
+from rigdda import Layout, sites
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.forecast import Value
 from rigdda.agents.designers.menu import Menu
@@ -77,7 +78,7 @@ def study(problem: DesignProblem, releases: int) -> list[dict[str, Any]]:
         e = verify(problem, built, releases, FRESH, store)
         found.append({
             "site": problem.site.name, "method": name, "z": e.objective, "z_low": e.ci[0],
-            "z_high": e.ci[1], "z_nothing": problem.nothing.objective, "mechanics": MECHANICS,
+            "z_high": e.ci[1], "z_nothing": problem.nothing.objective, **MADE_WITH,
             "layout": "; ".join(map(describe, built)),
         })  # fmt: skip
     return found
@@ -92,7 +93,7 @@ def relative(rows: Sequence[Any], method: str) -> NDArray[np.float64]:
 def run(quick: bool, out: Path) -> Number:
     """Write no_search.csv."""
     path = out / "no_search.csv"
-    rows: list[Any] = load(path)
+    rows: list[Any] = resumed(path)
     known = {r["site"] for r in rows}
     for problem in problems_of(QUICK_SITES if quick else SITES, sites.split("test")):
         if problem.site.name not in known:

@@ -27,11 +27,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from experiments.made_with import MADE_WITH
 from experiments.no_search import forecast
-from experiments.policy_table import FRESH, problems, resumed
+from experiments.policy_table import FRESH, known_rows, problems
 from experiments.script import GREY, Number, interval, main, say, write
 from experiments.script import draw as drawn
-from rigdda import MECHANICS, Layout
+from rigdda import Layout
 from rigdda.agents import designers
 from rigdda.agents.designers import policy, race
 from rigdda.agents.designers.convex import unsearched
@@ -129,8 +130,7 @@ def study(problem: DesignProblem, budgets: Sequence[int], releases: int) -> list
         found.append({
             "site": problem.site.name, "method": name, "budget": budget, "releases": releases,
             "z": e.objective, "z_low": e.ci[0], "z_high": e.ci[1],
-            "z_nothing": problem.nothing.objective, "mechanics": MECHANICS,
-            "table": policy.load().network.notes["table"],
+            "z_nothing": problem.nothing.objective, **MADE_WITH,
             "layout": "; ".join(map(describe, layout)),
         })  # fmt: skip
     return found
@@ -165,7 +165,7 @@ def draw(path: Path, rows: Sequence[Any], budgets: Sequence[int]) -> None:
 def run(quick: bool, out: Path) -> Number:
     """Write policy_search.csv and policy_search.png."""
     path, releases = out / "policy_search.csv", QUICK_RELEASES if quick else RELEASES
-    budgets, rows = QUICK_BUDGETS if quick else BUDGETS, resumed(path, releases)
+    budgets, rows = QUICK_BUDGETS if quick else BUDGETS, known_rows(path, releases)
     known = {row["site"] for row in rows}
     for problem in problems(QUICK_SITES if quick else SITES):
         if problem.site.name not in known:

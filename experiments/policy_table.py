@@ -23,10 +23,11 @@ from typing import Any
 
 import numpy as np
 
+from experiments.made_with import MADE_WITH, resumed
 from experiments.no_search import forecast, relative
 from experiments.script import Number, interval, main, say, write
-from experiments.search_gain import blocks, load
-from rigdda import MECHANICS, Layout, sites
+from experiments.search_gain import blocks
+from rigdda import Layout, sites
 from rigdda.agents.designers import policy
 from rigdda.agents.designers.protocol import verify
 from rigdda.agents.designers.store import Store
@@ -59,13 +60,12 @@ def study(problem: DesignProblem, releases: int) -> list[dict[str, Any]]:
     """Return the rows of a site."""
     say(problem.site.name)
     store, found = Store(), []
-    notes = policy.load().network.notes
     for name, layout in layouts(problem).items():
         e = verify(problem, layout, releases, FRESH, store)
         found.append({
             "site": problem.site.name, "method": name, "z": e.objective, "z_low": e.ci[0],
             "z_high": e.ci[1], "z_nothing": problem.nothing.objective, "releases": releases,
-            "mechanics": MECHANICS, "policy": notes["command"], "table": notes["table"],
+            **MADE_WITH,
             "layout": "; ".join(map(describe, layout)),
         })  # fmt: skip
     return found
@@ -82,10 +82,9 @@ def problems(count: int) -> list[DesignProblem]:
     return found
 
 
-def resumed(path: Path, releases: int) -> list[Any]:
-    """Return the rows of an earlier run with the same policy and as many releases a layout."""
-    table = policy.load().network.notes["table"]
-    return [r for r in load(path) if r["table"] == table and r["releases"] == str(releases)]
+def known_rows(path: Path, releases: int) -> list[Any]:
+    """Return the rows of an earlier run with the same networks and as many releases a layout."""
+    return [r for r in resumed(path) if r["releases"] == str(releases)]
 
 
 def differences(rows: Sequence[Any], others: Sequence[str]) -> dict[str, tuple[float, float]]:
@@ -97,7 +96,7 @@ def differences(rows: Sequence[Any], others: Sequence[str]) -> dict[str, tuple[f
 def run(quick: bool, out: Path) -> Number:
     """Write policy_table.csv."""
     path, releases = out / "policy_table.csv", QUICK_RELEASES if quick else RELEASES
-    rows = resumed(path, releases)
+    rows = known_rows(path, releases)
     known = {row["site"] for row in rows}
     for problem in problems(QUICK_SITES if quick else SITES):
         if problem.site.name not in known:

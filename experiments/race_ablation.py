@@ -24,6 +24,7 @@ from unittest import mock
 
 import numpy as np
 
+from experiments.made_with import MADE_WITH, resumed
 from experiments.no_search import Analytic
 from experiments.script import Number, interval, main, say, write
 from experiments.search_gain import (
@@ -33,10 +34,9 @@ from experiments.search_gain import (
     SEED,
     SITES,
     VERIFY,
-    load,
     problems_of,
 )
-from rigdda import MECHANICS, Layout, sites
+from rigdda import Layout, sites
 from rigdda.agents.designers import race
 from rigdda.agents.designers.convex import unsearched
 from rigdda.agents.designers.menu import Menu
@@ -109,7 +109,7 @@ def row(
         "site": problem.site.name, "without": part, "budget": budget,
         "releases": found.simulations, "cpu_s": found.seconds, "z": e.objective,
         "z_low": e.ci[0], "z_high": e.ci[1], "z_nothing": problem.nothing.objective,
-        "mechanics": MECHANICS, "layout": "; ".join(map(describe, found.layout)),
+        **MADE_WITH, "layout": "; ".join(map(describe, found.layout)),
     }  # fmt: skip
 
 
@@ -125,7 +125,7 @@ def losses(rows: list[Any], part: str, budget: int) -> list[float]:
 def run(quick: bool, out: Path) -> Number:
     """Write race_ablation.csv."""
     path = out / "race_ablation.csv"
-    rows: list[Any] = load(path)
+    rows: list[Any] = resumed(path)
     known = {(r["site"], r["without"], int(r["budget"])) for r in rows}
     budgets = QUICK_BUDGETS if quick else BUDGETS
     names = sites.split("validation")[FIRST:]

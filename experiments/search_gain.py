@@ -13,13 +13,13 @@ of the 95 % interval of the mean gain, the least of the budgets.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from experiments.made_with import MADE_WITH, resumed
 from experiments.script import Number, interval, main, say, write
-from rigdda import MECHANICS, sites
+from rigdda import sites
 from rigdda.agents import designers
 from rigdda.agents.designers.protocol import verify
 from rigdda.agents.designers.store import Store
@@ -66,16 +66,8 @@ def row(
         "releases": found.simulations, "cpu_s": found.seconds, "z": e.objective,
         "z_low": e.ci[0], "z_high": e.ci[1], "reported": found.evaluation.objective,
         "z_nothing": problem.nothing.objective, "origin": found.origin,
-        "mechanics": MECHANICS, "layout": "; ".join(map(describe, found.layout)),
+        **MADE_WITH, "layout": "; ".join(map(describe, found.layout)),
     }  # fmt: skip
-
-
-def load(path: Path) -> list[dict[str, str]]:
-    """Return the rows of an earlier run that were made by the current mechanics."""
-    if not path.is_file():
-        return []
-    with path.open(newline="", encoding="utf-8") as file:
-        return [r for r in csv.DictReader(file) if r["mechanics"] == MECHANICS]
 
 
 def gains(rows: Sequence[Any], budget: int) -> list[float]:
@@ -92,7 +84,7 @@ def gains(rows: Sequence[Any], budget: int) -> list[float]:
 def run(quick: bool, out: Path) -> Number:
     """Write search_gain.csv."""
     path = out / "search_gain.csv"
-    rows: list[Any] = load(path)
+    rows: list[Any] = resumed(path)
     known = {(r["site"], r["designer"], int(r["budget"])) for r in rows}
     budgets = QUICK_BUDGETS if quick else BUDGETS
     names = sites.split("validation")[FIRST:]

@@ -16,10 +16,10 @@ import math
 from pathlib import Path
 from typing import Any
 
+from experiments.made_with import MADE_WITH
 from experiments.no_search import relative
-from experiments.policy_table import FRESH, problems, resumed
+from experiments.policy_table import FRESH, known_rows, problems
 from experiments.script import Number, interval, main, say, write
-from rigdda import MECHANICS
 from rigdda.agents.designers import policy, race
 from rigdda.agents.designers.protocol import verify
 from rigdda.agents.designers.store import Store
@@ -49,8 +49,8 @@ def study(problem: DesignProblem, budget: int, releases: int) -> list[dict[str, 
         found.append({
             "site": problem.site.name, "family": problem.site.family, "method": name,
             "budget": budget, "releases": releases, "z": e.objective, "z_low": e.ci[0],
-            "z_high": e.ci[1], "z_nothing": problem.nothing.objective, "mechanics": MECHANICS,
-            "table": trained.network.notes["table"], "layout": "; ".join(map(describe, layout)),
+            "z_high": e.ci[1], "z_nothing": problem.nothing.objective, **MADE_WITH,
+            "layout": "; ".join(map(describe, layout)),
         })  # fmt: skip
     return found
 
@@ -59,7 +59,7 @@ def run(quick: bool, out: Path) -> Number:
     """Write wide_race.csv."""
     path = out / "wide_race.csv"
     budget, releases = (QUICK_BUDGET, QUICK_RELEASES) if quick else (BUDGET, RELEASES)
-    rows = [row for row in resumed(path, releases) if row["budget"] == str(budget)]
+    rows = [row for row in known_rows(path, releases) if row["budget"] == str(budget)]
     known = {row["site"] for row in rows}
     for problem in problems(QUICK_SITES if quick else SITES):
         if problem.site.name not in known:

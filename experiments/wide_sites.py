@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.known_forecasts import WORK, folder_of
+from experiments.made_with import MADE_WITH, resumed
 from experiments.script import Number, interval, main, say, write
-from experiments.search_gain import load
-from rigdda import MECHANICS, sites
+from rigdda import sites
 from rigdda.agents.learning import forecasts
 from rigdda.agents.learning.forecasts import SiteForecasts
 from rigdda.agents.learning.relative_layouts import candidates
@@ -52,7 +52,7 @@ def row(name: str, ranges: str, own: SiteForecasts) -> dict[str, Any]:
     count = np.array([len(json.loads(layout)) for layout in catalogue])
     least = {k: float(np.nanmin(np.where(count == k, own.z, np.nan), initial=1.0)) for k in (1, 2)}
     return {
-        "site": name, "family": sites.family_of(name), "ranges": ranges, "mechanics": MECHANICS,
+        "site": name, "family": sites.family_of(name), "ranges": ranges, **MADE_WITH,
         "z_nothing": own.nothing, "least": float(np.nanmin(own.z)),
         "single": least[1], "pair": least[2],
         "z": json.dumps([None if np.isnan(z) else round(float(z), 4) for z in own.z]),
@@ -96,7 +96,7 @@ def gaps(rows: list[Any], ranges: str) -> tuple[NDArray[np.float64], list[str]]:
 def run(quick: bool, out: Path) -> Number:
     """Write wide_sites.csv."""
     path = out / "wide_sites.csv"
-    rows: list[Any] = load(path)
+    rows: list[Any] = resumed(path)
     known, folder = {r["site"] for r in rows}, folder_of(WORK)
     for ranges, count in (QUICK_SITES if quick else SITES).items():
         asked = [name for name in names(ranges, count) if name not in known]

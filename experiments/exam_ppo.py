@@ -6,7 +6,7 @@ forecasts and without the value network, for H hours of processor time (2 by def
 episode and the sites `TRAINED_ON`. The releases without barriers that the observations of these
 sites need are included in the time.
 
-Writes exam/ppo.zip, the model, and exam/ppo.csv and exam/ppo.png, the mean reward of the episodes
+Writes exam/ppo.pt, the policy, and exam/ppo.csv and exam/ppo.png, the mean reward of the episodes
 in the course of the training. An interrupted training continues from the folder runs/exam_ppo. The
 entry of the exam is `experiments.exam_ppo:design`; it simulates no releases.
 """
@@ -52,8 +52,8 @@ LEAST_REWARD = -1.0
 """Rewards below this value are raised to it. Otherwise, layouts that cost several times as much as
 the damage would dominate the gradient."""
 
-MODEL = RESULTS / "exam" / "ppo.zip"
-"""File of the trained model."""
+POLICY = RESULTS / "exam" / "ppo.pt"
+"""File of the trained policy."""
 
 WORK = Path("runs/exam_ppo")
 """Folder of an interrupted training: the model and the course of the training."""
@@ -120,10 +120,11 @@ def train(names: Sequence[str], seconds: float, work: Path) -> tuple[PPO, list[d
 
 
 def design(task: Task) -> Layout:
-    """Return the layout that the trained model chooses for a site. It simulates no release."""
-    from stable_baselines3 import PPO
+    """Return the layout that the trained policy chooses for a site. It simulates no release."""
+    from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 
-    action, _ = PPO.load(MODEL, device="cpu").predict(task.observation, deterministic=True)
+    policy = MultiInputActorCriticPolicy.load(POLICY, device="cpu")
+    action, _ = policy.predict(task.observation, deterministic=True)
     problem = DesignProblem(task.site, max_barriers=3, kinds=KINDS)
     layout = problem.decode(action)
     return layout if task.problem.fits(layout) else ()
@@ -149,10 +150,10 @@ def draw_course(path: Path, course: Sequence[dict[str, float]]) -> None:
 def main(hours: float, out: Path) -> None:
     """Train the policy."""
     model, course = train(TRAINED_ON, 3600.0 * hours, WORK)
-    path = out / "exam" / MODEL.name
+    path = out / "exam" / POLICY.name
     path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic(path) as part, part.open("wb") as file:
-        model.save(file)
+    with atomic(path) as part:
+        model.policy.save(str(part))
     write(out / "exam" / "ppo.csv", course)
     draw_course(out / "exam" / "ppo.png", course)
     last = float(np.mean([row["reward"] for row in course[-20:]]))

@@ -28,9 +28,9 @@ def test_a_training_continues_and_its_model_designs(names, tmp_path, monkeypatch
     model, longer = exam_ppo.train(names, course[0]["processor_s"] + 1e-3, tmp_path)
     assert longer[0] == course[0] and longer[1]["episodes"] == 2 * course[0]["episodes"]
     assert all(exam_ppo.LEAST_REWARD <= row["reward"] <= 1.0 for row in longer)
-    path = tmp_path / "ppo.zip"
-    model.save(path)
-    monkeypatch.setattr(exam_ppo, "MODEL", path)
+    path = tmp_path / "ppo.pt"
+    model.policy.save(str(path))
+    monkeypatch.setattr(exam_ppo, "POLICY", path)
     task = practice(names[0], budget=0)
     layout = exam_ppo.design(task)
     assert task.used == 0

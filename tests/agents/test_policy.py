@@ -13,8 +13,8 @@ from safetensors.numpy import save_file
 from rigdda import MECHANICS, BadInput, Site
 from rigdda.agents.designers import policy
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.policy import Policy, decide
-from rigdda.agents.learning.forecasts import FEATURES, of_site
+from rigdda.agents.designers.policy import TEMPERATURE, Policy, decide
+from rigdda.agents.learning.forecasts import FEATURES, FORECAST_Z, of_site
 from rigdda.agents.learning.relative_layouts import NOTHING, candidates, placed
 from rigdda.agents.network import NAMES, WIDTH, Network, features
 from rigdda.envs import DesignProblem
@@ -77,20 +77,21 @@ CATALOGUE = (NOTHING, DITCH, FENCE, BOTH)
 def preferring(weights: dict[int, float]) -> Policy:
     """Return a policy whose score of a layout is a weighted sum of its features."""
     row = np.zeros((1, FEATURES), np.float32)
+    row[0, FORECAST_Z] = 1.0 / TEMPERATURE  # the correction cancels the score by the forecast
     for place, weight in weights.items():
-        row[0, place] = weight
+        row[0, place] += weight
     zeros, ones = np.zeros(FEATURES, np.float32), np.ones(FEATURES, np.float32)
     return Policy(Network(zeros, ones, [(row, np.zeros(1, np.float32))], {}), CATALOGUE)
 
 
-COST, FORECAST = 0, 2
-"""Features of a layout: its annual cost, and its forecast Z, over Z without barriers."""
+COST = 0
+"""Number of the feature that is the annual cost over Z without barriers."""
 
 
 def test_the_layout_with_the_highest_score_is_built(site: Site) -> None:
     problem = DesignProblem(site)
     found = of_site(problem, CATALOGUE)
-    least = decide(preferring({FORECAST: -1.0}), problem)
+    least = decide(preferring({FORECAST_Z: -1.0}), problem)
     assert least == found.layouts[int(np.nanargmin(found.z))] != ()
     assert decide(preferring({COST: -1.0}), problem) == ()
     dearest = decide(preferring({COST: 1.0}), problem)

@@ -385,7 +385,7 @@ def test_a_bad_layout_file_is_one_line(
         (("replay", "quick", "--event", "flood"), ("event", "flood", "group")),
         (("evaluate", "--split", "exam"), ("--split", "exam", "test")),
         (("exam", "--entry", "no_such_module:design"), ("--entry", "no_such_module")),
-        (("exam", "--entry", "math:cos", "--sites", 25), ("sites", "25", "at most 24")),
+        (("exam", "--entry", "math:cos", "--sites", 28), ("sites", "28", "at most 27")),
         (("exam", "--entry", "math:cos", "--spec", "none.toml"), ("spec", "none.toml")),
         (("dataset", "--split", "exam"), ("--split", "exam", "train")),
         (("dataset", "--sites", 1201), ("sites", "1201", "at most 1200")),

@@ -391,7 +391,7 @@ def compliance(done: DesignStudy) -> str:
         return ""
     other, chosen = done.unchecked, done.chosen.evaluation
     if other is None:
-        return "requiring the checks costs nothing: no better layout was found without them"
+        return "without required checks, the search found no better layout"
     free = other.evaluation
     failed = failed_checks(done.other_checks[other.name])
     faults = [f"fails its checks ({failed_words(failed)})"] if failed else []

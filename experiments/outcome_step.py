@@ -87,9 +87,7 @@ def picture(figure: Figure, rows: list[Row]) -> None:
         )
         axes.errorbar(1e3 * dt, share, half, fmt="o-", color=colour, capsize=3, label=name)
     axes.axvline(1e3 * Settings().dt, color="0.8", linewidth=6.0, zorder=0, label="default")
-    axes.set(
-        xscale="log", xlabel="step [ms]", ylabel="share past the road's edge [-]", ylim=(0, 1)
-    )
+    axes.set(xscale="log", xlabel="step [ms]", ylabel="share past the road's edge [-]", ylim=(0, 1))
     axes.set_xticks([1e3 * dt for dt in STEPS], [f"{1e3 * dt:g}" for dt in STEPS], minor=False)
     axes.minorticks_off()
     axes.legend()

@@ -8,7 +8,7 @@ difference over the tasks has a 95 % interval that contains 0. Then the entries 
 second set of releases. Judged by the share of the pairs told apart that have the same order there.
 
 Writes exam/leaderboard.csv, exam/leaderboard.png and exam/stability.csv. An interrupted run
-continues from the folder runs/leaderboard.
+continues from the folder runs/leaderboard, if the networks of the package are the same.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from experiments.made_with import MADE_WITH
 from experiments.script import BLUE, GREY, Number, draw, folder, options, say, write
 from rigdda.app.exam import ranking, specification
 from rigdda.app.exam.scorer import Scorer
@@ -47,8 +48,8 @@ BUDGETS, QUICK_BUDGETS = (0, 500), (0, 60)
 STABLE, QUICK_STABLE = 0.95, 0.0
 """Least share of the pairs told apart that have the same order on a second set of releases [-]."""
 
-WORK = Path("runs/leaderboard")
-"""Folder of the exams of the entries."""
+WORK = Path("runs/leaderboard") / "-".join(MADE_WITH.values())
+"""Folder of the exams of the entries with the present mechanics and networks."""
 
 KEPT = (
     "track", "budget", "tasks", "score", "score_low", "score_high", "distance", "used", "flags",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -156,6 +157,16 @@ def test_the_policy_that_ships_says_how_it_was_made() -> None:
 
 
 SHAPE = "not a policy of this version"
+
+
+def test_a_policy_that_imitates_forecasts_is_refused(tmp_path: Path) -> None:
+    """Earlier policies had their catalogue under another key, and scores without the forecast."""
+    now = preferring({COST: 1.0})
+    notes = {"layouts": json.dumps(CATALOGUE)}
+    earlier = Network(now.network.mean, now.network.scale, now.network.layers, notes)
+    earlier.save(tmp_path / "earlier.safetensors")
+    with pytest.raises(BadInput, match=SHAPE):
+        policy.load(tmp_path / "earlier.safetensors")
 
 
 def test_a_network_of_another_shape_is_refused(tmp_path: Path) -> None:

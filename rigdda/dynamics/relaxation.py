@@ -113,6 +113,19 @@ def part_of_step(
 
 
 @kernel
+def to_forces(rows: Rows, count: int, last: float, short: bool) -> None:
+    """Divide the impulses of the last substep by its duration `last` [s].
+
+    After a `short` substep, contacts that had an impact have no force.
+    """
+    for place in range(count):
+        lasts = 0.0 if rows.fact[place, STRUCK] > 0.0 and short else 1.0 / last
+        rows.row[place, IMPULSE] *= lasts
+        rows.row[place, IMPULSE + 1] *= lasts
+        rows.row[place, ROLLED] *= lasts
+
+
+@kernel
 def relax(
     rows: Rows, n: int, count: int, speed: float, p: Parameters, ledger: NDArray
 ) -> tuple[int, bool, bool]:
@@ -175,9 +188,5 @@ def relax(
             ledger[1] -= stop_uphill(rows.slot, n)
         struck, last, left = struck or hit, h, left - h if h < left else 0.0
         number += 0 if alone else 1
-    for place in range(count):  # to forces; none after an impact in a short substep
-        lasts = 0.0 if rows.fact[place, STRUCK] > 0.0 and last < 0.5 * usual else 1.0 / last
-        rows.row[place, IMPULSE] *= lasts
-        rows.row[place, IMPULSE + 1] *= lasts
-        rows.row[place, ROLLED] *= lasts
+    to_forces(rows, count, last, last < 0.5 * usual)
     return sweeps, struck, swept < MOST_SWEEPS

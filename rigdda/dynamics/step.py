@@ -73,6 +73,39 @@ def set_out(bodies: Bodies, shaking: Shaking, since: float, time: float, p: Para
 
 
 @stage
+def take_step(
+    world: World, before: Contacts, now: Contacts, work: Work, monitors: Monitors, time: float,
+    p: Parameters, totals: Totals,
+) -> tuple[int, int]:  # fmt: skip
+    """Move all bodies by a step.
+
+    Parameters
+    ----------
+    before, now : (K,) array of CONTACTS
+        Contacts of the step before, and room for those of this one.
+
+    Returns
+    -------
+    count : int
+        Number of contacts, or -1 without room for them; nothing has moved then.
+    bad : int
+        A block that diverged, or -1.
+    """
+    bodies, outlines, _, _, links, shaking, _ = world
+    counters, ledger = totals.counters, totals.ledger
+    set_out(bodies, shaking, counters[STEPS] * p.dt, time, p)
+    copy_index(work.begin, work.first)
+    count = detect(world, now, before, work, monitors, time, p, totals)
+    if count < 0:
+        copy_index(work.first, work.begin)
+        return -1, -1
+    bad = solve_and_move(world, now, work, monitors, time, p, totals)
+    ledger[4] += mend_links(bodies, outlines, links, p)
+    update_fences(bodies, outlines, now, count, monitors, counters, ledger, time, p)
+    return count, bad
+
+
+@stage
 def end_step(
     bodies: Bodies, contacts: Contacts, count: int, work: Work, monitors: Monitors,
     counters: NDArray, p: Parameters,
@@ -117,11 +150,8 @@ def advance(
     bodies, outlines, ground, _, links, shaking, stems = world
     counters, ledger = totals.counters, totals.ledger
     may_fly = len(links) == 0 and len(shaking) == 0 and not p.static and p.post_correction
-    flyer, flown, flight = (
-        variable(-1),
-        variable(0),
-        0,
-    )  # flying body, steps flown, and steps of the flight
+    # flying body, steps flown, and steps of the flight
+    flyer, flown, flight = variable(-1), variable(0), 0
     while steps > 0 and reason == DONE:
         room = len(monitors.event) - counters[EVENTS]
         if room < (p.blocks + 1) * (len(monitors.station) + len(monitors.target)):
@@ -139,18 +169,11 @@ def advance(
             bad = fly(bodies, flyer, p, ledger)
             flight = flight if bodies[flyer].status == AWAKE else flown
         else:
-            set_out(bodies, shaking, counters[STEPS] * p.dt, time, p)
-            copy_index(work.begin, work.first)
-            count = detect(world, before, now, work, monitors, time, p, totals)
+            count, bad = take_step(world, now, before, work, monitors, time, p, totals)
             if count < 0:
-                copy_index(work.first, work.begin)
                 reason = CONTACTS_FULL
                 break
-            now, before = before, now
-            swapped = not swapped
-            bad = solve_and_move(world, now, work, monitors, time, p, totals)
-            ledger[4] += mend_links(bodies, outlines, links, p)
-            update_fences(bodies, outlines, now, count, monitors, counters, ledger, time, p)
+            now, before, swapped = before, now, not swapped
         counters[CONTACTS] = count
         counters[CONTACT_TOTAL] += count
         meet_stems(bodies, stems, ledger)

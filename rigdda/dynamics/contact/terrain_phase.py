@@ -257,40 +257,48 @@ def bridges(
 
 
 @inlined
-def edge_on_ridge(
-    bodies: Bodies, outlines: Outlines, ground: GroundArrays, box: Box, contacts: Contacts, k: int,
-    a: int, part: int, corner: int, p: Parameters,
-) -> int:  # fmt: skip
-    """Add the contact of a convex terrain corner with an edge of a part of block a, if any.
+def fitting_edge(
+    outlines: Outlines, ground: GroundArrays, a: int, part: int, corner: int, dx: float, dy: float,
+    lean: float, reach: float, p: Parameters,
+) -> tuple[int, float]:  # fmt: skip
+    """Return the edge of a part of block a that meets a convex terrain corner, or -1.
 
-    The edge must be the last one to separate the corner from the block, or about as deep. Its
-    normal must lie approximately between those of the two segments, otherwise a corner of the block
-    is in contact instead.
+    The edge must be the last one to separate the corner from the part, or about as deep. Its normal
+    must lie approximately between those of the two segments, otherwise a corner of the block is in
+    contact instead.
+
+    Parameters
+    ----------
+    dx, dy : float
+        Motion of the corner relative to the block in the step [m].
+    lean : float
+        Tolerance of the directions of normals [-].
+    reach : float
+        Greatest gap of an edge [m].
+
+    Returns
+    -------
+    edge : int
+        Its number, or -1.
+    time : float
+        Time at which it touches the corner, in steps; NEVER if it does not.
     """
-    left, right, block = ground.segment[corner - 1], ground.segment[corner], bodies[a]
+    left, right = ground.segment[corner - 1], ground.segment[corner]
     x, y = right.x, right.y
-    dt, n = p.dt, outlines.polygon[part].count
-    dx = -(block.vx - block.omega * (y - block.y)) * dt
-    dy = -(block.vy + block.omega * (x - block.x)) * dt
-    if not (box.low_x <= x <= box.high_x and box.low_y <= y <= box.high_y):
-        return k
-    concave = part != a
-    lean = abs(block.omega) * dt
-    reach = block.path + p.gravity * dt * dt + p.margin
     # on a ridge that turns by more than 90 deg, a normal between both may oppose the left one
     out_x, out_y = left.normal_x, left.normal_y
     if left.normal_x * right.normal_x + left.normal_y * right.normal_y < -SHARP:
         out_x, out_y = out_x + right.normal_x, out_y + right.normal_y
     best, best_time, best_gap = variable(-1), -1.0, -1e300
     last, depth = -1.0, -1e300  # of all edges, whether they fit or not
-    for edge in range(n):
+    for edge in range(outlines.polygon[part].count):
         own = outlines.corner[part, edge]
         nx, ny = own.normal_x, own.normal_y
         gap = nx * (x - own.x) + ny * (y - own.y)
         approach = -(nx * dx + ny * dy)
         if gap > reach:
-            return k
-        inner = concave and own.inner
+            return -1, 0.0
+        inner = part != a and own.inner
         if inner and gap <= 0.0:
             continue  # push the corner out of the block, not into the next part
         time = 0.0
@@ -306,11 +314,35 @@ def edge_on_ridge(
         if time > last or (time == last and gap > depth):
             last, depth = time, gap
     if best < 0 or best_time < last:
-        return k
+        return -1, 0.0
     # when a corner of the block slides over the ridge, another edge soon becomes the nearest one:
     # keep the fitting edge while the depths are similar or while it bridges the ridge
     alike = best_gap >= 2.0 * min(depth, 0.0) - p.margin
     if not alike and not bridges(outlines, ground, part, best, corner, 0.5 * best_gap):
+        return -1, 0.0
+    return best, best_time
+
+
+@inlined
+def edge_on_ridge(
+    bodies: Bodies, outlines: Outlines, ground: GroundArrays, box: Box, contacts: Contacts, k: int,
+    a: int, part: int, corner: int, p: Parameters,
+) -> int:  # fmt: skip
+    """Add the contact of a convex terrain corner with an edge of a part of block a, if any.
+
+    Returns the new number of contacts; `fitting_edge` chooses the edge.
+    """
+    right, block = ground.segment[corner], bodies[a]
+    x, y = right.x, right.y
+    dt, n = p.dt, outlines.polygon[part].count
+    dx = -(block.vx - block.omega * (y - block.y)) * dt
+    dy = -(block.vy + block.omega * (x - block.x)) * dt
+    if not (box.low_x <= x <= box.high_x and box.low_y <= y <= box.high_y):
+        return k
+    lean = abs(block.omega) * dt
+    reach = block.path + p.gravity * dt * dt + p.margin
+    best, best_time = fitting_edge(outlines, ground, a, part, corner, dx, dy, lean, reach, p)
+    if best < 0:
         return k
     time = min(best_time, 1.0) if 0.0 < best_time < NEVER else 0.0
     hit_x, hit_y = x + time * dx, y + time * dy

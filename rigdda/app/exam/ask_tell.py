@@ -50,7 +50,7 @@ class AskTell:
     --------
     >>> from rigdda.app.exam.ask_tell import AskTell
     >>> from rigdda.app.exam.counter import practice
-    >>> search = AskTell(practice("narrow-1000000", budget=60))
+    >>> search = AskTell(practice("wide-1000003", budget=60))
     >>> rng = np.random.default_rng(0)
     >>> while search.open:
     ...     value = search(rng.uniform(size=search.size))

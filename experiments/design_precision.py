@@ -3,7 +3,7 @@
 `python -m experiments.design_precision [--quick] [--out DIR]`. On every built-in design site, the
 command's search and verification run twice, with the default `--precision` and with
 `--precision 0`, in both cases with required checks. Both layouts are evaluated on the same fresh
-releases. A site agrees if both layouts have barriers of the same kinds, or if the interval of the
+releases. A site agrees if both layouts have barriers of the same kinds and the 95 % interval of the
 difference of Z contains zero.
 
 Writes design_precision.csv, one row per site. An interrupted run is resumed. Judged by the number
@@ -80,7 +80,7 @@ def row(name: str, limits: tuple[int, int], fresh: int) -> dict[str, Any]:
         release_seeds("verification", FRESH_SEED, fresh),
     )
     same = found["short_kinds"] == found["long_kinds"]
-    agrees = same or apart.ci[0] <= 0.0 <= apart.ci[1]
+    agrees = same and apart.ci[0] <= 0.0 <= apart.ci[1]
     return found | {
         "difference": apart.value, "difference_low": apart.ci[0], "difference_high": apart.ci[1],
         "z_nothing": problem.nothing.objective, "agrees": int(agrees), **MADE_WITH,

@@ -2,9 +2,11 @@
 
 `python -m experiments.no_search [--quick] [--out DIR]`. On sites of the test split, which no
 training used, every method builds one layout without simulating any layout: nothing, the constant,
-the engineering rule, the least Z by the analytic estimate of the passages (`analytic`) and by the
-value network (`value`). Both estimates use the same releases without barriers. The layouts are
-verified on the same fresh releases. Sites with an event of 100 blocks or more are left out.
+the engineering rule, the best layout of the family of the site (chosen by forecasts on training
+sites with wide ranges; nothing on sites of a family without any), the policy that ships, the least
+Z by the analytic estimate of the passages (`analytic`) and by the value network (`value`). The
+estimates use the same releases without barriers. The layouts are verified on the same fresh
+releases. Sites with an event of 100 blocks or more are left out.
 
 Writes no_search.csv, one row per layout. An interrupted run is resumed. Judged by the lower end of
 the 95 % interval of the gain of the value network over the better of the constant and the rule.
@@ -23,15 +25,15 @@ from experiments.made_with import MADE_WITH, resumed
 from experiments.script import Number, interval, main, say, write
 from experiments.search_gain import FRESH, QUICK_VERIFY, VERIFY, problems_of
 from rigdda import Layout, sites
-from rigdda.agents.designers.constant import constant
+from rigdda.agents import training
+from rigdda.agents.designers import policy
 from rigdda.agents.designers.forecast import Value
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import Ledger, verify
 from rigdda.agents.designers.race import forecast_pool
-from rigdda.agents.designers.rule import answer
 from rigdda.agents.designers.store import Store
 from rigdda.barriers import describe
-from rigdda.envs import DesignProblem
+from rigdda.envs import DesignProblem, forecast_table
 
 SITES, QUICK_SITES = 18, 2
 BUDGET = 20_000
@@ -60,13 +62,8 @@ def forecast(problem: DesignProblem, value: Value | None) -> Layout:
 
 def methods(problem: DesignProblem) -> dict[str, Layout]:
     """Return the layout of every method."""
-    return {
-        "nothing": (),
-        "constant": constant(problem, Menu(problem)),
-        "rule": answer(problem).layout,
-        "analytic": forecast(problem, Analytic()),
-        "value": forecast(problem, None),
-    }
+    simple = training.methods(policy.load(), forecast_table.load(), problem)
+    return simple | {"analytic": forecast(problem, Analytic()), "value": forecast(problem, None)}
 
 
 def study(problem: DesignProblem, releases: int) -> list[dict[str, Any]]:
@@ -101,7 +98,7 @@ def run(quick: bool, out: Path) -> Number:
             write(path, rows)
     value = relative(rows, "value")
     lines, least = [], np.inf
-    for other in ("nothing", "constant", "rule", "analytic"):
+    for other in ("nothing", "constant", "rule", "best of the family", "policy", "analytic"):
         mean, half = interval(relative(rows, other) - value)
         lines.append(f"value ahead of {other}: {mean:.3f} +- {half:.3f}")
         least = min(least, mean - half) if other in ("constant", "rule") else least

@@ -37,7 +37,7 @@ from rigdda import BadInput, Layout, sites
 from rigdda.agents import designers
 from rigdda.agents.designers.protocol import verify
 from rigdda.agents.designers.store import Store
-from rigdda.app.cli import BUDGET
+from rigdda.app.commands.design import BUDGET
 from rigdda.barriers import describe
 from rigdda.envs import DesignProblem, Evaluation
 

@@ -158,7 +158,7 @@ def picture(figure: Figure, table: list[dict[str, Any]]) -> None:
                               color=colour, capsize=2, label=label)  # fmt: skip
         axes.set(title=words, xlabel="friction of the weathered rock [deg]", ylim=(0.0, 1.0))
     figure.axes[0].set_ylabel("share of releases")
-    figure.axes[1].legend(fontsize=8)
+    figure.axes[1].legend(fontsize=8, handlelength=4.0)
 
 
 def run(quick: bool, out: Path) -> Number:

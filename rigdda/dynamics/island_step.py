@@ -262,10 +262,10 @@ def accumulate_force(c: Contact) -> None:
 
 @inlined
 def account_contacts(
-    contacts: Contacts, islands: Islands, rows: Rows, low: int, high: int, monitors: Monitors,
-    p: Parameters, ledger: NDArray,
+    bodies: Bodies, contacts: Contacts, islands: Islands, rows: Rows, low: int, high: int,
+    monitors: Monitors, p: Parameters, ledger: NDArray,
 ) -> None:  # fmt: skip
-    """Add the work of contacts to the ledger and to the barriers."""
+    """Add the work of contacts to the ledger and the barriers, and note which bodies touch."""
     for item in range(low, high):
         c, row = contacts[islands.contact_item[item]], rows.fact[rows.place[item]]
         support = c.kind == BOLT or c.kind == PIN
@@ -279,8 +279,13 @@ def account_contacts(
         else:
             ledger[0] += row[WORK + 1]
             ledger[1] += row[WORK]
-        if c.state != OPEN and len(monitors.target) > 0:  # open contacts did work in a rebound
+        if c.state == OPEN:  # impulses that a rebound takes back do work as well
+            continue
+        if len(monitors.target) > 0:
             press(c, monitors, p.dt)
+        bodies[c.a].touching = True
+        if c.b >= 0:
+            bodies[c.b].touching = True
 
 
 @inlined
@@ -326,13 +331,15 @@ def step_island(
     c0, c1 = islands.contact_start[island], islands.contact_start[island + 1]
     b0, b1 = islands.block_start[island], islands.block_start[island + 1]
     bad = -1
+    for place in range(b0, b1):
+        bodies[islands.block_item[place]].touching = False
     if c1 > c0:
         struck = settle_island(world, contacts, work, island, p, totals)
         if len(monitors.target) > 0:
             counters[EVENTS] = note_hits(
                 bodies, contacts, islands, c0, c1, monitors, counters[EVENTS], time
             )
-        account_contacts(contacts, islands, rows, c0, c1, monitors, p, ledger)
+        account_contacts(bodies, contacts, islands, rows, c0, c1, monitors, p, ledger)
         push_out(contacts, islands, rows, island, struck, p)
     for place in range(b0, b1):
         i = islands.block_item[place]

@@ -351,11 +351,8 @@ def pack_parameters(
 ) -> NDArray[np.void]:
     """Return the parameters of the scene and the settings."""
     gx, gy = scene.gravity_vector
-    gravity = math.hypot(gx, gy)
     static = settings.mode == "static"
     shaken = scene.base_motion is not None
-    # without gravity, a body that drifts slowly is not at rest
-    may_rest = gravity > 0.0 and not (static or shaken or scene.supports)
     floor = -np.inf
     if scene.terrain is not None and gx == 0.0 and gy < 0.0:
         floor = scene.terrain.points[:, 1].min() - FALL_BELOW
@@ -364,7 +361,7 @@ def pack_parameters(
         "blocks": free_bodies(scene),
         "gravity_x": gx,
         "gravity_y": gy,
-        "gravity": gravity,
+        "gravity": math.hypot(gx, gy),
         "field_x": gx,
         "field_y": gy,
         "damping": scene.damping,
@@ -376,7 +373,7 @@ def pack_parameters(
         "islands": settings.islands,
         "solver": SOLVERS.index(settings.solver),
         "relaxation": settings.relaxation,
-        "sleeping": settings.sleeping and may_rest,
+        "sleeping": settings.sleeping and not (static or shaken or scene.supports),
         "floor": floor,
         "bonded": (interfaces["cohesion"] + interfaces["tension"]).any(),
     }

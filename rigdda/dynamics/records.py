@@ -45,6 +45,7 @@ BODY = _record(
     elongation=float,  # elongation that is left in a fence [m]
     held_at=float,  # x up to which the elongation has been used [m]
     island=int,  # island in which a sleeping body fell asleep
+    touching=bool,  # whether one of its contacts was closed in the last step
     whole=bool,  # whether its island was solved as a whole in the last step
     force_x=float,  # dead load [N]
     force_y=float,

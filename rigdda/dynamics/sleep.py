@@ -44,8 +44,7 @@ def wake_neighbours(bodies: Bodies, pairs: Ints, count: int, blocks: int) -> int
 def update_quiet_time(bodies: Bodies, islands: Islands, count: int, p: Parameters) -> None:
     """Update how long blocks have been quiet, and put islands to sleep in which all blocks are.
 
-    A block that accelerates is not quiet, because it has begun to slide or fall. Contacts do not
-    count: in short steps, all contacts of a block at rest may be open for a step.
+    A block that accelerates is not quiet, because it has begun to slide or fall.
     """
     for s in range(count):
         least = 1e300
@@ -54,7 +53,8 @@ def update_quiet_time(bodies: Bodies, islands: Islands, count: int, p: Parameter
             speed = top_speed(body)
             body.slowest = min(body.slowest, speed) if body.quiet > 0.0 else speed
             growing = speed > body.slowest + GROWN * SLEEP_SPEED
-            quiet = speed < SLEEP_SPEED and not growing
+            rests = body.touching or body.brake > 0.0
+            quiet = rests and speed < SLEEP_SPEED and not growing
             body.quiet = body.quiet + p.dt if quiet else 0.0
             least = min(least, body.quiet)
         if least < SLEEP_TIME:

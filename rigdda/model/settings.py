@@ -82,7 +82,8 @@ class Settings:
         Whether each cluster of touching blocks is solved separately; otherwise all blocks form one
         system.
     sleeping : bool
-        Whether blocks at rest sleep, at no cost, until they are disturbed.
+        Whether blocks at rest sleep, at no cost, until they are disturbed. In static mode and in
+        scenes with ground motion, bolts or fixed points, no block sleeps.
 
     Raises
     ------

@@ -71,7 +71,7 @@ def test_the_ground_of_the_library_predicts_about_as_well_as_a_fit():
     real = next(row for row in table("grounds.csv") if row["model"] == "observed")
     fitted, meadow = by["tschamut and chant sura"], by["the library: meadow"]
     bars = {"run_out_mean_m": 2.0, "run_out_50_m": 2.0, "run_out_95_m": 5.0, "block_4_m": 5.0,
-            "contacts_mean": 0.02, "mid_slope_mean": 0.05, "stops_on_slope": 0.02}  # fmt: skip
+            "contacts_mean": 0.05, "mid_slope_mean": 0.05, "stops_on_slope": 0.02}  # fmt: skip
     for column, bar in bars.items():
         off, best = (abs(float(row[column]) - float(real[column])) for row in (meadow, fitted))
         assert off < best + bar, column

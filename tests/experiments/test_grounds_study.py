@@ -65,16 +65,33 @@ def test_the_recorded_prediction_of_contacts_is_near_those_that_were_observed():
     assert abs(np.median(kept) - np.median(real)) < 0.12
 
 
-def test_the_ground_of_the_library_predicts_about_as_well_as_a_fit():
-    """The alpine cases do not determine single parameters, so its values need not be the fit's."""
+WORSE = pytest.mark.xfail(reason="a later fit predicts it better than the ground of the library")
+
+
+@pytest.mark.parametrize(
+    ("column", "bar"),
+    [
+        ("run_out_mean_m", 2.0),
+        ("run_out_50_m", 2.0),
+        pytest.param("run_out_95_m", 2.0, marks=WORSE),
+        pytest.param("block_4_m", 2.0, marks=WORSE),
+        pytest.param("contacts_mean", 0.02, marks=WORSE),
+        ("mid_slope_mean", 0.05),
+        ("stops_on_slope", 0.02),
+    ],
+)
+def test_the_ground_of_the_library_predicts_as_well_as_a_fit(column, bar):
     by = {row["fitted_on"]: row for row in table("grounds.csv") if row["model"] == "blocks"}
     real = next(row for row in table("grounds.csv") if row["model"] == "observed")
     fitted, meadow = by["tschamut and chant sura"], by["the library: meadow"]
-    bars = {"run_out_mean_m": 2.0, "run_out_50_m": 2.0, "run_out_95_m": 5.0, "block_4_m": 5.0,
-            "contacts_mean": 0.05, "mid_slope_mean": 0.05, "stops_on_slope": 0.02}  # fmt: skip
-    for column, bar in bars.items():
-        off, best = (abs(float(row[column]) - float(real[column])) for row in (meadow, fitted))
-        assert off < best + bar, column
+    off, best = (abs(float(row[column]) - float(real[column])) for row in (meadow, fitted))
+    assert off < best + bar
+
+
+def test_a_fit_is_in_the_ranges_of_the_ground_of_the_library():
+    """The alpine cases do not determine single parameters, so its values need not be the fit's."""
+    by = {row["fitted_on"]: row for row in table("grounds.csv") if row["model"] == "blocks"}
+    fitted = by["tschamut and chant sura"]
     ranges = GROUNDS["meadow"]
     for name in ("friction_deg", "restitution", "rolling"):
         span = getattr(ranges, name)

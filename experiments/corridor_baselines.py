@@ -30,6 +30,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -258,7 +259,7 @@ def run(quick: bool, out: Path) -> Number:
     school = Course(pools("train", sites, releases, folder), sections)
     course = Course(pools("test", sites, releases, folder), sections)
     best, left = of_families(school)
-    rows = []
+    rows: list[dict[str, Any]] = []
     for budget in BUDGETS[: 1 if quick else None]:
 
         def tuned(kind: Callable[[float], Policy], budget: float = budget) -> float:

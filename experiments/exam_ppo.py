@@ -123,7 +123,7 @@ def design(task: Task) -> Layout:
     """Return the layout that the trained policy chooses for a site. It simulates no release."""
     from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 
-    policy = MultiInputActorCriticPolicy.load(POLICY, device="cpu")
+    policy = MultiInputActorCriticPolicy.load(str(POLICY), device="cpu")
     action, _ = policy.predict(task.observation, deterministic=True)
     problem = DesignProblem(task.site, max_barriers=3, kinds=KINDS)
     layout = problem.decode(action)

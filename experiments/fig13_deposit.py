@@ -83,7 +83,7 @@ def draw_sweep(figure: SubFigure, axes: Axes, rows: list[dict[str, Any]]) -> Non
 
 def draw_all(figure: Figure, first: dict[str, Run], rows: list[dict[str, Any]]) -> None:
     """Draw the site, the rockfall at several times, the deposits and the sweep."""
-    above, below = figure.subfigures(2, height_ratios=(1.0, 1.1))
+    above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.1))[:, 0]
     run = first["restitution 0.2"]
     for axes, time in zip(above.subplots(1, 1 + len(TIMES)), (0.0, *TIMES), strict=True):
         frame = int(np.abs(run.times - time).argmin())

@@ -47,9 +47,12 @@ def structure(height: float) -> Layout:
     return (Wall(x=SITE.road.start - THICKNESS, height=height, thickness=THICKNESS),)
 
 
-def rows_of(contact: str, heights: tuple[float, ...], seeds: range) -> tuple[list[dict], list[Run]]:
+def rows_of(
+    contact: str, heights: tuple[float, ...], seeds: range
+) -> tuple[list[dict[str, Any]], list[Run]]:
     """Return a row per height, 0 first, and the first runs without and with the drawn structure."""
-    rows, drawn = [], []
+    rows: list[dict[str, Any]] = []
+    drawn = []
     for height in (0.0, *heights):
         say(f"fig14: {contact}, {height:g} m")
         found = releases(variant(contact), structure(height), seeds)

@@ -16,6 +16,7 @@ import hashlib
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,7 @@ from rigdda import (
 from rigdda.envs import DesignProblem
 from rigdda.model.settings import Settings
 from rigdda.releases import Batch
-from rigdda.validation.case import evaluate
+from rigdda.validation.case import Case, evaluate
 from rigdda.validation.suite import CASES
 
 TABLE = Path("outcomes/outcomes.csv")
@@ -141,6 +142,11 @@ def costs_of(site: Site) -> str:
     return digest(*((layout, e.objective, e.ci) for layout, e in zip(layouts, found, strict=True)))
 
 
+def case_of(case: Case) -> str:
+    """Return the digest of the results of a closed-form case."""
+    return digest(*(str(result) for result in evaluate(case)))
+
+
 def computed() -> Iterator[tuple[str, Callable[[], str]]]:
     """Yield the name of every computation and the function that returns its digest."""
     for name, layouts in LAYOUTS.items():
@@ -148,19 +154,19 @@ def computed() -> Iterator[tuple[str, Callable[[], str]]]:
         for words, layout in layouts:
             for event in site.event_names:
                 what = f"releases of {name}, {words}, {event}"
-                yield what, lambda s=site, a=layout, e=event: outcomes_of(s, a, e)
+                yield what, partial(outcomes_of, site, layout, event)
     for solver in SOLVERS:
-        yield f"motion with solver {solver}", lambda s=solver: motion_of(solver=s)
-    yield "motion in static mode", lambda: motion_of(mode="static")
-    yield "motion without post-correction", lambda: motion_of(post_correction=False)
+        yield f"motion with solver {solver}", partial(motion_of, solver=solver)
+    yield "motion in static mode", partial(motion_of, mode="static")
+    yield "motion without post-correction", partial(motion_of, post_correction=False)
     yield "motion with a bolt and a fixed point", motion_with_supports
-    yield "motion as one island", lambda: motion_of(islands=False, sleeping=False)
+    yield "motion as one island", partial(motion_of, islands=False, sleeping=False)
     for case in CASES:
         if case.name in CASE_NAMES:
-            yield f"case {case.name}", lambda c=case: digest(*(str(r) for r in evaluate(c)))
-    yield f"cost of {COSTS} layouts of quick", lambda: costs_of(Site.load("quick"))
+            yield f"case {case.name}", partial(case_of, case)
+    yield f"cost of {COSTS} layouts of quick", partial(costs_of, Site.load("quick"))
     for name in ("rigdda/BarrierDesign-v0", "rigdda/BarrierPlacement-v0"):
-        yield f"{EPISODES} episodes of {name}", lambda n=name: episodes_of(n)
+        yield f"{EPISODES} episodes of {name}", partial(episodes_of, name)
 
 
 def recorded(out: Path) -> dict[str, str]:

@@ -68,7 +68,7 @@ def of_one_block(site: Site) -> list[str]:
 def run(quick: bool, out: Path) -> Number:
     """Time releases and write the table."""
     bench = sites.load(SITE)
-    cases = [
+    cases: list[tuple[Site, str, str, dict[str, Layout]]] = [
         (site, "one block", name, {"nothing": ()})
         for site in map(sites.load, SITES)
         for name in of_one_block(site)

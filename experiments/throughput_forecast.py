@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -50,12 +51,12 @@ def script(steps: int) -> float:
     """Train a small policy by the policy gradient; return the mean reward of the last tenth."""
     env = batch()
     torch.manual_seed(0)
-    width, actions = env.single_observation_space.shape[0], int(env.single_action_space.n)
+    seen, infos = env.reset(seed=0)
+    width, actions = seen.shape[1], infos["action_mask"].shape[1]
     net = torch.nn.Sequential(
         torch.nn.Linear(width, 64), torch.nn.Tanh(), torch.nn.Linear(64, actions)
     )
     optimiser = torch.optim.Adam(net.parameters(), lr=3e-3)
-    seen, infos = env.reset(seed=0)
     rewards_seen = []
     for _ in range(steps // COPIES):
         mask = torch.tensor(infos["action_mask"] > 0)
@@ -74,7 +75,9 @@ def script(steps: int) -> float:
 def ppo(steps: int) -> float:
     """Train PPO of Stable-Baselines3; return its mean reward on the training sites."""
     copies = rigdda.envs.sb3_vec_env(NAME, COPIES, site="train", flat=True)
-    terms = {"n_steps": 8, "batch_size": 512, "n_epochs": 4, "gamma": 1.0, "seed": 0}
+    terms: dict[str, Any] = {
+        "n_steps": 8, "batch_size": 512, "n_epochs": 4, "gamma": 1.0, "seed": 0,
+    }  # fmt: skip
     model = PPO("MlpPolicy", copies, learning_rate=1e-3, device="cpu", **terms)
     model.learn(steps)
     table = forecast_table.load()
@@ -93,7 +96,8 @@ RUNS: dict[str, Callable[[int], float]] = {
 def run(quick: bool, out: Path) -> Number:
     """Write throughput_forecast.csv."""
     torch.set_num_threads(1)
-    steps, rows = QUICK_STEPS if quick else STEPS, []
+    steps = QUICK_STEPS if quick else STEPS
+    rows: list[dict[str, Any]] = []
     for name, play in RUNS.items():
         start, begun = time.process_time(), time.perf_counter()
         reward = play(steps)

@@ -18,12 +18,12 @@ Floats = NDArray[np.float64]
 class Shapes(NamedTuple):
     """The convex blocks of a scene about their centroids, and the chain of its terrain.
 
-    Corners (N, C, 2) anticlockwise and their number (N,), radius about the centroid (N,), corners
-    of the terrain (M, 2) with the ground on the right [m].
+    Corners (N, C, 2) anticlockwise, number of sides (N,), radius about the centroid (N,), and
+    corners of the terrain (M, 2) with the ground on the right [m].
     """
 
     corners: Floats
-    count: NDArray[np.int64]
+    sides: NDArray[np.int64]
     radius: Floats
     terrain: Floats
 
@@ -48,17 +48,17 @@ def shapes(scene: Scene) -> Shapes:
 
 
 @numba.njit(cache=True)
-def _place(world, corners, count, pose):
+def _place(world: Floats, corners: Floats, sides: int, pose: Floats) -> None:
     """Write the corners of a block at its pose (x, y, theta) into `world`."""
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
-    for k in range(count):
+    for k in range(sides):
         x, y = corners[k, 0], corners[k, 1]
         world[k, 0] = pose[0] + cos * x - sin * y
         world[k, 1] = pose[1] + sin * x + cos * y
 
 
 @numba.njit(cache=True)
-def _overlap(a, na, b, nb):
+def _overlap(a: Floats, na: int, b: Floats, nb: int) -> float:
     """Return the least overlap of two convex polygons along the normals of `a`, < 0 if apart."""
     least = math.inf
     for i in range(na):
@@ -74,7 +74,7 @@ def _overlap(a, na, b, nb):
 
 
 @numba.njit(cache=True)
-def _depth_in_ground(x, y, terrain):
+def _depth_in_ground(x: float, y: float, terrain: Floats) -> float:
     """Return the distance of a point to the terrain if it is in the ground, else 0 [m]."""
     nearest, side = math.inf, 0.0
     for i in range(len(terrain) - 1):
@@ -90,7 +90,7 @@ def _depth_in_ground(x, y, terrain):
 
 
 @numba.njit(cache=True)
-def _depth_of_terrain(a, na, terrain):
+def _depth_of_terrain(a: Floats, na: int, terrain: Floats) -> float:
     """Return the depth of the deepest corner of the terrain inside a block [m]."""
     deepest = 0.0
     for k in range(len(terrain)):
@@ -99,7 +99,9 @@ def _depth_of_terrain(a, na, terrain):
 
 
 @numba.njit(cache=True)
-def _deepest(poses, corners, count, radius, terrain):
+def _deepest(
+    poses: Floats, corners: Floats, sides: NDArray[np.int64], radius: Floats, terrain: Floats
+) -> Floats:
     """Return the greatest depth of each frame, (T,) [m]."""
     frames, blocks = poses.shape[:2]
     out = np.zeros(frames)
@@ -107,17 +109,17 @@ def _deepest(poses, corners, count, radius, terrain):
     for t in range(frames):
         pose = poses[t]
         for i in range(blocks):
-            _place(world[i], corners[i], count[i], pose[i])
-            for k in range(count[i]):
+            _place(world[i], corners[i], sides[i], pose[i])
+            for k in range(sides[i]):
                 out[t] = max(out[t], _depth_in_ground(world[i, k, 0], world[i, k, 1], terrain))
-            out[t] = max(out[t], _depth_of_terrain(world[i], count[i], terrain))
+            out[t] = max(out[t], _depth_of_terrain(world[i], sides[i], terrain))
             for j in range(i):
                 reach = radius[i] + radius[j]
                 dx, dy = pose[i, 0] - pose[j, 0], pose[i, 1] - pose[j, 1]
                 if dx * dx + dy * dy < reach * reach:
-                    one = _overlap(world[i], count[i], world[j], count[j])
+                    one = _overlap(world[i], sides[i], world[j], sides[j])
                     if one > out[t]:
-                        other = _overlap(world[j], count[j], world[i], count[i])
+                        other = _overlap(world[j], sides[j], world[i], sides[i])
                         out[t] = max(out[t], min(one, other))
     return out
 

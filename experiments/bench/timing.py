@@ -102,12 +102,12 @@ def first_run(setting: Setting, case: Case) -> None:
                 poses.append(engine.poses())
         except Diverged:
             poses[-1] = np.full_like(poses[0], np.nan)
-        times = np.arange(len(poses)) * stride * setting.dt
-        finite = np.isfinite(poses).all()
-        seen = scene, times, np.array(poses)
-        errors.append(case.error(*seen) if finite else np.inf)
+        times = np.array([k * stride * setting.dt for k in range(len(poses))])
+        path = np.array(poses)
+        finite = np.isfinite(path).all()
+        errors.append(case.error(scene, times, path) if finite else np.inf)
         if case.greatest is not None:
-            greatest.append(case.greatest(*seen) if finite else np.inf)
+            greatest.append(case.greatest(scene, times, path) if finite else np.inf)
     setting.error = case.total(errors)
     if greatest:
         setting.greatest = case.total(greatest)

@@ -166,8 +166,8 @@ def picture(figure: Figure, every: dict[tuple[str, float], Floats]) -> None:
         axes.plot(*PREDICTED, "o", color=RED, mfc="none", label="calibrated model: predicted")
         axes.set(title=f"face of {face:g} deg", xlabel="width from the toe [m]", ylim=(0.0, 1.0))
     figure.axes[0].set_ylabel("retained share")
-    handles, words = figure.axes[0].get_legend_handles_labels()
-    figure.axes[-1].legend(handles, words, fontsize=8, loc="lower right")
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.axes[-1].legend(handles, labels, fontsize=8, loc="lower right")
 
 
 def run(quick: bool, out: Path) -> Number:

@@ -32,7 +32,7 @@ def column(load: float, gravity: float) -> Deformable:
 
 def bar_under_its_weight() -> tuple[Floats, Floats]:
     """Return the computed vertical stress of each block, and - rho g (H - y) at its middle [Pa]."""
-    y = HEIGHT * (np.arange(BLOCKS) + 0.5)
+    y = np.array([HEIGHT * (i + 0.5) for i in range(BLOCKS)])
     return column(0.0, GRAVITY).stress[:, 1], -DENSITY * GRAVITY * (HEIGHT * BLOCKS - y)
 
 

@@ -12,6 +12,7 @@ Judged by the mean share of energy kept in contacts, predicted by the fit to Tsc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -146,14 +147,14 @@ class Field:
         if case == "catch bench":
             found = self.widths(values, range(seeds.start, seeds.start + 3 * len(seeds)))
             off = [within(found, width) - share for width, share in (FITTED, PREDICTED)]
-            return float(np.hypot(*off)) / 0.1
+            return math.hypot(*off) / 0.1
         if case == "chant sura":
             own = scores(self.kept, self.kept).mean()
             return float(scores(self.contacts(values, seeds), self.kept).mean() / own)
-        found = self.tschamut(values, seeds)
-        each = [scores(found[e], self.seen[e]) for e in self.seen]
-        own = [scores(self.seen[e], self.seen[e]) for e in self.seen]
-        return float(np.concatenate(each).mean() / np.concatenate(own).mean())
+        run_outs = self.tschamut(values, seeds)
+        each = np.concatenate([scores(run_outs[e], self.seen[e]) for e in self.seen])
+        least = np.concatenate([scores(self.seen[e], self.seen[e]) for e in self.seen])
+        return float(each.mean() / least.mean())
 
     def fit(self, cases: tuple[str, ...], budget: int, releases: int) -> Floats:
         """Return the values with the best fit to some cases, each weighted by its observations."""
@@ -231,7 +232,7 @@ def tschamut_figures(
     below_share = np.cumsum(weight[order])
     out = {"run_out_mean_m": float(values @ weight)}
     for share in (0.05, 0.5, 0.95):
-        at = values[order][min(np.searchsorted(below_share, share), len(values) - 1)]
+        at = values[order][min(int(np.searchsorted(below_share, share)), len(values) - 1)]
         out[f"run_out_{100 * share:.0f}_m"] = float(at)
     out |= {f"{e.replace(' ', '_')}_m": float(found[e].mean()) for e in found}
     return out | {"stops_on_slope": float(weight[values <= toe].sum())}

@@ -28,6 +28,7 @@ Floats = NDArray[np.float64]
 
 SITE = Site.load("shu-hwa-paper")
 (ROCK,) = SITE.sources
+assert ROCK.block_area is not None
 BARRIER = SITE.slope.toe
 """Chainage of the barrier, at the toe [m]."""
 
@@ -57,7 +58,7 @@ class Budget(NamedTuple):
     duration: float
 
 
-FULL = Budget(150, 50, 30, ROCK.block_area, (4.0, 2.0, 0.5), SITE.motion.duration)
+FULL = Budget(300, 50, 30, ROCK.block_area, (4.0, 2.0, 0.5), SITE.motion.duration)
 QUICK = Budget(12, 6, 4, 8.0, (2.0,), 20.0)
 
 

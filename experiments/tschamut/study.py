@@ -120,7 +120,7 @@ def picture(
     site: Site,
 ) -> None:
     """Draw cumulative run-outs of all runs and of each block, and a section with trajectories."""
-    above, below = figure.subfigures(2, 1)
+    above, below = figure.subfigures(2, 1, squeeze=False)[:, 0]
     names = ("all", *observed)
     for axes, name in zip(above.subplots(1, len(names), sharey=True), names, strict=True):
         events = list(observed) if name == "all" else [name]
@@ -214,8 +214,8 @@ def run(quick: bool, out: Path) -> Number:
                 rows.append(behind("PlatRock", fitted.left_out, lost, peer.cpu))
                 predicted["PlatRock"] = dict(peer.run_outs(fitted.best.values, seeds))
                 found["PlatRock"] = fitted
-        except RuntimeError as error:  # keep the results of the other models
-            say(f"tschamut: {error}")
+        except RuntimeError as failure:  # keep the results of the other models
+            say(f"tschamut: {failure}")
     write(out / "tschamut" / "tschamut.csv", rows)
     predict(out / "tschamut" / "prediction.csv", site, list(observed), count)
     slope = found["blocks"].site

@@ -8,7 +8,7 @@ import numpy as np
 import pyb2d3
 
 from experiments.bench.penetration import centroids
-from rigdda import Scene
+from rigdda import Block, Scene
 
 NAME = "box2d"
 
@@ -69,7 +69,7 @@ class Engine:
             pyb2d3.chain_def(chain, material=self._material)
         )
 
-    def _add_block(self, block, centre, damping: float):
+    def _add_block(self, block: Block, centre: np.ndarray, damping: float) -> pyb2d3.Body:
         body = self._world.create_dynamic_body(
             position=tuple(centre), linear_damping=damping, angular_damping=damping
         )

@@ -8,7 +8,7 @@ import numpy as np
 import pymunk
 
 from experiments.bench.penetration import centroids
-from rigdda import Scene
+from rigdda import Block, Scene
 from rigdda.geometry import polygon_properties
 
 NAME = "pymunk"
@@ -72,7 +72,7 @@ class Engine:
             shape.set_neighbors(before.tolist(), after.tolist())
             self._space.add(self._with_surface(shape))
 
-    def _add_block(self, block, centre) -> pymunk.Body:
+    def _add_block(self, block: Block, centre: np.ndarray) -> pymunk.Body:
         area, _, second = polygon_properties(block.vertices)
         body = pymunk.Body(block.density * area, block.density * second)
         body.position = tuple(centre)

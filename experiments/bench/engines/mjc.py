@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from experiments.bench.penetration import centroids
-from rigdda import Scene
+from rigdda import Block, Scene
 from rigdda.geometry import polygon_properties
 
 NAME = "mujoco"
@@ -85,7 +85,7 @@ class Engine:
         mujoco.mj_forward(self._model, self._data)
         self._start = centroids(scene)
 
-    def _add_terrain(self, spec, points: np.ndarray) -> None:
+    def _add_terrain(self, spec: mujoco.MjSpec, points: np.ndarray) -> None:
         """Add a plane for a terrain of one segment, or else a box below each segment."""
         for a, b in pairwise(points):
             along = b - a
@@ -103,7 +103,9 @@ class Engine:
                 **self._contact,
             )
 
-    def _add_block(self, spec, i: int, block, centre, damping: float) -> None:
+    def _add_block(
+        self, spec: mujoco.MjSpec, i: int, block: Block, centre: np.ndarray, damping: float
+    ) -> None:
         """Add an extruded polygon that translates in x and z and rotates about -y."""
         outline = block.vertices - centre
         area, _, second = polygon_properties(block.vertices)

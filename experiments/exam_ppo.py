@@ -90,6 +90,7 @@ def train(names: Sequence[str], seconds: float, work: Path) -> tuple[PPO, list[d
     """
     import torch
     from stable_baselines3 import PPO
+    from stable_baselines3.common.logger import Logger
 
     torch.set_num_threads(1)
     work.mkdir(parents=True, exist_ok=True)
@@ -99,6 +100,7 @@ def train(names: Sequence[str], seconds: float, work: Path) -> tuple[PPO, list[d
     start = time.process_time()
     batch = copies(names)
     model = PPO.load(kept, batch) if course else PPO("MultiInputPolicy", batch, **SETTINGS)
+    model.set_logger(Logger(None, []))  # the default one creates a temporary folder
     while not course or course[-1]["processor_s"] < seconds:
         model.learn(SETTINGS["n_steps"] * COPIES, reset_num_timesteps=False)
         rewards = model.rollout_buffer.rewards

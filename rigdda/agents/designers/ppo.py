@@ -14,6 +14,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
 
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Plan, Progress, finish
 from rigdda.agents.designers.store import Store
@@ -49,6 +50,7 @@ def design(
         "MlpPolicy", bandit, n_steps=16, batch_size=16, n_epochs=10, learning_rate=1e-3,
         policy_kwargs={"net_arch": [16], "log_std_init": -0.7}, seed=ledger.seed, **COMMON,
     )  # fmt: skip
+    model.set_logger(Logger(None, []))  # the default one creates a temporary folder
     if bandit.paid():
         model.learn(10**9, callback=_WhilePaid(bandit))
     return finish(ledger, plan)

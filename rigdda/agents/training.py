@@ -247,17 +247,20 @@ def best_of_families(table: ForecastTable) -> dict[str, list[int]]:
 def methods(policy: Policy, table: ForecastTable, problem: DesignProblem) -> dict[str, Layout]:
     """Return the layouts of the policy and of the rules that it is compared with.
 
-    The rules are no barrier, the constant, the engineering rule and the best layout of the family
-    that can be built (`best_of_families`), which uses the family of the site.
+    The rules are no barrier, the constant, the engineering rule, the best layout of the family that
+    can be built (`best_of_families`), which uses the family of the site, and the layout of the
+    policy's catalogue with the least forecast Z.
     """
     menu = Menu(problem)
     order = best_of_families(table).get(sites.family_of(problem.site.name), [0])
     family = (placed(menu, table.layouts[i]) for i in order)
+    forecast = forecasts.of_site(problem, policy.layouts)
     found = {
         "nothing": (),
         "constant": constant(problem, menu),
         "rule": answer(problem).layout,
         "best of the family": next((layout for layout in family if layout is not None), ()),
+        "least forecast": forecast.layouts[int(np.nanargmin(forecast.z))] or (),
         "policy": decide(policy, problem),
     }
     return {name: layout if problem.fits(layout) else () for name, layout in found.items()}
@@ -296,7 +299,7 @@ def compared(
     policy: Policy, table: ForecastTable, names: Sequence[str], releases: int, store: Store,
     tick: Tick,
 ) -> list[Compared]:  # fmt: skip
-    """Return Z of the policy and of simple rules on some sites, on the same fresh releases.
+    """Return Z of the policy and of the simple rules on sites, on the same fresh releases.
 
     Sites with an event of `MASS` blocks or more are left out.
 

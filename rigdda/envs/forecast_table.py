@@ -29,9 +29,6 @@ Rows = NDArray[np.int64]
 SHIPPED = Path(__file__).parent / "forecasts.safetensors"
 """The table that ships with the package, made by `python -m experiments.known_forecasts`."""
 
-PARTS = ("train", "validation", "test")
-"""Purposes of the sites of a table."""
-
 NAMES = tuple(sorted(FIELDS))
 """Arrays of the observation of a site in the order in which a table concatenates them."""
 
@@ -80,7 +77,8 @@ class ForecastTable:
     def rows(self, site: str | Sequence[str]) -> Rows:
         """Return the rows of a site, of a split or of a sequence of sites.
 
-        The rows of "train", "validation" and "test" are those of both versions of the splits.
+        The rows of "train", "validation" and "test" are those of both versions of the splits, those
+        of "wide-train", "wide-validation" and "wide-test" those of the version with wide ranges.
 
         Raises
         ------
@@ -89,8 +87,13 @@ class ForecastTable:
         """
         place = {name: row for row, name in enumerate(self.names)}
         split = "train" if site == "random" else site
-        if isinstance(split, str) and split in PARTS:
-            found = [row for row, name in enumerate(self.names) if sites.part_of(name) == split]
+        if isinstance(split, str) and split in sites.SPLITS:
+            part = split.removeprefix("wide-")
+            found = [
+                row
+                for row, name in enumerate(self.names)
+                if sites.part_of(name) == part and name.startswith(split.removesuffix(part))
+            ]
             if not found:
                 raise BadInput("site", site, "the table of forecasts has no site of this split")
             return np.array(found)

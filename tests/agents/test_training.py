@@ -178,13 +178,14 @@ def test_the_value_of_the_policy_is_shown_beside_simple_rules(tmp_path: Path) ->
     pytest.importorskip("torch")
     words = run("train", "--compare", 1, "--verify", 20, "--out", tmp_path / "o", folder=tmp_path)
     assert "95 %" in words
-    for method in ("nothing", "constant", "rule", "best of the family", "policy"):
+    methods = ("nothing", "constant", "rule", "best of the family", "least forecast", "policy")
+    for method in methods:
         assert method in words
     with (tmp_path / "o/comparison.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     (bare,) = (row for row in rows if row["method"] == "nothing")
     assert float(bare["z"]) == float(bare["nothing"])
-    assert len(rows) == 5 and {row["site"] for row in rows} == {"wide-1000000"}
+    assert len(rows) == len(methods) and {row["site"] for row in rows} == {"wide-1000000"}
     notes = load(tmp_path / "o/policy.safetensors").network.notes
     assert notes["command"] == "rigdda train --algorithm gradient --simulate 0 --seed 0"
     line = refused("train", "--seed", 1, "--out", tmp_path / "o", folder=tmp_path)

@@ -41,6 +41,16 @@ def test_same_point_costs_nothing_again() -> None:
     assert value == direct.objective
 
 
+def test_a_search_that_repeats_a_layout_ends() -> None:
+    task = practice(SITE, budget=40)
+    search, points = AskTell(task, releases=5), 0
+    while search.open:
+        search(np.full(search.size, 0.7))
+        points += 1
+    assert points == 60 and task.used == 5  # ten times the six layouts of the budget of the search
+    assert task.problem.fits(search.best())
+
+
 def test_kinds_and_ends_of_the_box() -> None:
     search = AskTell(practice(SITE, budget=0))
     assert search.layout(np.zeros(search.size)) == ()

@@ -15,7 +15,7 @@ from gymnasium.vector import AutoresetMode
 
 import rigdda.envs
 from rigdda import BadInput
-from rigdda.envs import forecast_environment
+from rigdda.envs import forecast_environment, forecast_table
 from rigdda.envs.forecast_table import NAMES, WIDTH, ForecastTable, joined
 from rigdda.envs.observation import FIELDS
 
@@ -90,6 +90,17 @@ def test_a_split_gives_only_its_sites(table: ForecastTable) -> None:
         env = gymnasium.make(NAME, table=table, site=split)
         drawn = {env.reset(seed=i)[1]["site"] for i in range(40)}
         assert drawn == {*names}
+
+
+def test_a_wide_split_is_that_part_of_the_shipped_table() -> None:
+    shipped = forecast_table.load()
+    for part in ("train", "validation", "test"):
+        assert (shipped.rows(f"wide-{part}") == shipped.rows(part)).all()
+
+
+def test_a_table_of_narrow_sites_has_no_wide_split(table: ForecastTable) -> None:
+    with pytest.raises(BadInput, match="no site of this split"):
+        gymnasium.make(NAME, table=table, site="wide-train")
 
 
 @pytest.mark.parametrize("flat", [False, True])

@@ -52,17 +52,18 @@ def train(
 
     A policy chooses a layout from a catalogue of relative layouts. It learns on forecasts of the
     value network, which takes seconds, and with --simulate also on outcomes. Its layouts are then
-    compared with no barrier, the constant, the rule and the best layout of the family of each site.
-    Writes policy.safetensors, for `rigdda evaluate --policy`, and comparison.csv.
+    compared with no barrier, the constant, the rule, the best layout of the family of each site and
+    the layout with the least forecast Z. Writes policy.safetensors, for `rigdda evaluate --policy`,
+    and comparison.csv.
 
     The value network forecasts the remaining risk with any layout from the rockfall without
     barriers. It is trained on simulated layouts of every site, which takes about half a minute for
     each site. Writes value.safetensors. The value network of the package is the prior of the
     designer `race`.
 
-    The agent for corridors has to estimate how much money will save in the remaining sections. The
-    estimate is computed from forecasts of the value network on every site, which takes about half a
-    minute for each site. Writes prospect.safetensors.
+    The agent for corridors has to estimate how much the remaining money would save in the remaining
+    sections. The estimate is computed from forecasts of the value network on every site, which
+    takes about half a minute for each site. Writes prospect.safetensors.
 
     An interrupted training continues where it stopped and gives the same result; the training of
     the agent for corridors starts again. Training a policy or the value network requires the extra

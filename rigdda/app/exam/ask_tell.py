@@ -18,6 +18,10 @@ FINALISTS = 5
 LAYOUTS = 60
 """Number of layouts of a search by default."""
 
+REPEATS = 10
+"""Greatest number of points for each layout that the budget allows, on average. It ends a search
+that proposes known layouts only, which cost no releases."""
+
 
 class AskTell:
     """The annual cost of a layout as a function of a point, within the budget of a task.
@@ -62,12 +66,17 @@ class AskTell:
         self._reserve = int(check.number("final", final, 0.0, 1.0) * task.left)
         each = max(1, (task.left - self._reserve) // LAYOUTS)
         self.releases = each if releases is None else check.integer("releases", releases, 1)
+        self._points = REPEATS * ((task.left - self._reserve) // self.releases)
         self._found: dict[Layout, float] = {}
 
     @property
     def open(self) -> bool:
-        """Whether the budget allows another layout."""
-        return self.task.left - self._reserve >= self.releases
+        """Whether the search may go on.
+
+        It ends when the budget does not allow another layout, or after ten times as many points as
+        the budget allows layouts.
+        """
+        return self._points > 0 and self.task.left - self._reserve >= self.releases
 
     def layout(self, point: ArrayLike) -> Layout:
         """Return the layout of a point.
@@ -86,11 +95,12 @@ class AskTell:
         """Return the estimated Z of a point [EUR per metre and year], to be minimised.
 
         All points are evaluated on the same releases. A layout that was evaluated before costs
-        nothing. When the budget of the search is used up, the value is infinite.
+        nothing. When the search is no longer `open`, the value of a new layout is infinite.
         """
-        layout = self.layout(point)
+        layout, still = self.layout(point), self.open
+        self._points -= 1
         if layout not in self._found:
-            if not self.open:
+            if not still:
                 return math.inf
             self._found[layout] = self.task.evaluate(layout, self.releases).objective
         return self._found[layout]

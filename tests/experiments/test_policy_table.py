@@ -17,3 +17,8 @@ def test_differences_are_paired_over_the_sites() -> None:
     found = policy_table.differences(rows, ("rule", "constant"))
     assert found["rule"] == pytest.approx((0.1, 0.0), abs=1e-12)
     assert found["constant"] == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+def test_a_forecast_that_is_too_low_is_too_good() -> None:
+    row = {"method": policy_table.LEAST, "z": 30.0, "z_forecast": 20.0, "z_nothing": 100.0}
+    assert policy_table.optimism([row, row | {"method": "policy"}]) == pytest.approx([0.1])

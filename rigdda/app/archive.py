@@ -168,17 +168,22 @@ def read(folder: Path) -> Archive:
     Raises
     ------
     BadInput
-        If there is none, or it is damaged or was written by another version.
+        If there is none, or it is damaged, or its releases were simulated with other mechanics.
     """
     path = folder / ARCHIVE_FILE
     if not is_file(path):
         hint = f"name the folder of a completed `rigdda design`, which contains {ARCHIVE_FILE}"
         raise BadInput("RESULTS", str(folder), hint)
     try:
-        return msgspec.msgpack.decode(gzip.decompress(path.read_bytes()), type=Archive)
+        found = msgspec.msgpack.decode(gzip.decompress(path.read_bytes()), type=Archive)
     except (OSError, EOFError, ValueError, zlib.error, msgspec.MsgspecError) as error:
         hint = f"run `rigdda design` again: this file is damaged or of another version ({error})"
         raise BadInput("RESULTS", str(path), " ".join(hint.split())) from None
+    if found.mechanics != MECHANICS:
+        hint = f"its releases were simulated with mechanics {found.mechanics!r}, those of this "
+        hint += f"version are {MECHANICS!r}: run `rigdda design` again"
+        raise BadInput("RESULTS", str(path), hint)
+    return found
 
 
 def layout_of(tables: Sequence[dict[str, Any]]) -> Layout:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import shutil
 import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 
 import rigdda
 from rigdda import MECHANICS, Layout, Outcome, Run, Site
+from rigdda.app.unfinished import PARTS
 from rigdda.envs.envelope import largest
 from rigdda.envs.outcome_cache import fingerprint
 from rigdda.files import atomic
@@ -21,10 +21,6 @@ from rigdda.passages import Passages, passages
 
 Tick = Callable[[int, str], None]
 """Called during a job with the number of releases so far and a description of the activity."""
-
-
-PARTS = "parts"
-"""Folder of the releases of an unfinished job. It is removed when the tables are written."""
 
 
 CHUNK, LEAST = 256, 16
@@ -52,8 +48,8 @@ def simulate(
 ) -> Simulated:
     """Simulate releases on all cores.
 
-    Releases are written into `out/parts` as they are done. A job that was killed continues from
-    there if it is given the same task, or a larger number of releases.
+    Releases are written into the folder `.unfinished` of `out` as they are done. A job that was
+    killed continues from there if it is given the same task, or a larger number of releases.
 
     Raises
     ------
@@ -112,8 +108,3 @@ def _read_part(file: Path, seeds: range) -> tuple[list[Outcome], Passages] | Non
         msgspec.MsgspecError,
     ):  # fmt: skip
         return None
-
-
-def forget(out: Path) -> None:
-    """Remove the parts of a job whose tables are written."""
-    shutil.rmtree(out / PARTS, ignore_errors=True)

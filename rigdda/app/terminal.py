@@ -7,7 +7,7 @@ import re
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -174,6 +174,9 @@ FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*]')
 LONGEST_FOLDER_NAME = 200
 """Greatest length of the name of a folder [bytes]; operating systems allow 255."""
 
+UNRECORDED = ("report",)
+"""Commands that write into a results folder without a record in it."""
+
 PAUSE = 15.0
 """Least time between two progress lines if standard error is not a terminal [s]."""
 
@@ -248,10 +251,13 @@ def once() -> Callable[..., None]:
 def folder_for(out: Path | None, name: str, *files: str) -> Path:
     """Create the output folder if needed and return it: `out`, or `name` in runs/.
 
+    Files of the user and results of other commands are never overwritten.
+
     Raises
     ------
     BadInput
-        If the folder cannot be created or written into, or one of the files cannot be written.
+        If the folder cannot be created or written into, or one of the files cannot be written or
+        was not written by the command that is running.
     """
     from rigdda import BadInput
 
@@ -266,7 +272,38 @@ def folder_for(out: Path | None, name: str, *files: str) -> Path:
         if file.exists() and not (file.is_file() and os.access(file, os.W_OK)):
             hint = "this file cannot be overwritten: move it away or name another folder"
             raise BadInput("--out", str(file), hint)
+    _refuse_foreign(folder, files)
     return folder
+
+
+def _refuse_foreign(folder: Path, files: Sequence[str]) -> None:
+    """Check that the files which exist in a folder are results of the command that is running.
+
+    Which command wrote a file is in the record of the folder. Nothing is checked for a function
+    that is called from Python, or for a command without a record, such as `report`.
+
+    Raises
+    ------
+    BadInput
+        If a file exists that another command or the user wrote.
+    """
+    from rigdda import BadInput
+    from rigdda.agents.run_record import read
+
+    context = click.get_current_context(silent=True)
+    if context is None or context.info_name in UNRECORDED:
+        return
+    known, command = read(folder), str(context.info_name)
+    own = known.pop(command, None)
+    for file in files:
+        writer = next((name for name, record in known.items() if file in record.files), None)
+        if writer is not None:
+            hint = f"`rigdda {writer}` wrote this file: name another folder"
+        elif own is None and (folder / file).exists():
+            hint = f"this file is not a result of `rigdda {command}`: name another folder"
+        else:
+            continue
+        raise BadInput("--out", str(folder / file), hint)
 
 
 def _part(name: str) -> str:

@@ -123,7 +123,8 @@ def test_a_killed_design_goes_on(designed: tuple[Path, str], toml: Path, tmp_pat
     lines = (folder / "evaluations.jsonl").read_bytes().splitlines(keepends=True)
     half = len(lines) // 2
     (tmp_path / "evaluations.jsonl").write_bytes(b"".join(lines[:half]) + lines[half][:40])
-    (tmp_path / "problem.json").write_bytes((folder / "problem.json").read_bytes())
+    for name in ("problem.json", "run.json"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
     words = run("design", toml, *TINY, "--seed", 3, "--out", tmp_path, folder=tmp_path)
     assert re.search(r"[\d,]+ releases from an earlier run", words)
     assert (tmp_path / "layout.toml").read_bytes() == (folder / "layout.toml").read_bytes()

@@ -14,7 +14,7 @@ import pytest
 from processes import refused, rows, run
 
 import rigdda
-from rigdda import BadInput, Outcome, Site
+from rigdda import MECHANICS, BadInput, Outcome, Site
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.app import archive, design, reprice
 from rigdda.app.reports import design_report
@@ -286,6 +286,13 @@ def test_a_folder_without_a_design_is_refused(tmp_path: Path, designed: Path) ->
         (folder / archive.ARCHIVE_FILE).write_bytes(content)
         line = refused("reprice", folder, folder=tmp_path)
         assert "damaged or of another version" in line
+
+
+def test_releases_of_other_mechanics_are_refused(designed: Path, tmp_path: Path) -> None:
+    kept = msgspec.structs.replace(archive.read(designed), mechanics="0")
+    archive.write(tmp_path / archive.ARCHIVE_FILE, kept)
+    with pytest.raises(BadInput, match=f"mechanics '0', those of this version are '{MECHANICS}'"):
+        archive.read(tmp_path)
 
 
 def test_the_folder_of_the_design_is_not_overwritten(designed: Path, tmp_path: Path) -> None:

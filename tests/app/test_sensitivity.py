@@ -23,6 +23,7 @@ from rigdda.app.uncertainty.parameters import (
 )
 from rigdda.app.uncertainty.sensitivity import Response, analyse, of_function, places, plan
 from rigdda.app.uncertainty.sensitivity import run as analyse_site
+from rigdda.app.unfinished import PARTS
 from rigdda.envs.cost import judge
 from rigdda.ground.grounds import GROUNDS
 
@@ -262,7 +263,7 @@ def test_a_killed_analysis_goes_on_and_ends_the_same(analysed: tuple[Path, str])
     dice, out = random.Random(5), folder / "killed"
     for least in sorted(dice.sample(range(1, 13), 2)):
         killed = rig(*COMMAND, "--seed", 3, "--out", "killed", folder=folder)
-        while len(list((out / "parts").glob("[!.]*.z"))) < least:
+        while len(list((out / PARTS).glob("[!.]*.z"))) < least:
             assert killed.poll() is None
             time.sleep(0.002)
         time.sleep(0.02 * dice.random())
@@ -272,4 +273,4 @@ def test_a_killed_analysis_goes_on_and_ends_the_same(analysed: tuple[Path, str])
     assert "from an interrupted run" in words
     for file in ("sensitivity.csv", "samples.csv"):
         assert (out / file).read_bytes() == (folder / "whole" / file).read_bytes()
-    assert not (out / "parts").exists()
+    assert not (out / PARTS).exists()

@@ -28,6 +28,7 @@ from rigdda.app.terminal import (
     show_risks,
     warn_of_placeholders,
 )
+from rigdda.app.unfinished import forget
 
 if TYPE_CHECKING:
     from rigdda.agents.designers.store import Store
@@ -204,7 +205,7 @@ def _on_other_grounds(
     with progress(grounds) as tick:
         band = ground_band.assess(done, grounds, fitted, seed, folder, tick)
     report.write_band(folder, band)
-    ground_band.forget(folder)
+    forget(folder)
     return band
 
 

@@ -18,6 +18,7 @@ from rigdda.app.terminal import (
     seed_option,
     show,
 )
+from rigdda.app.unfinished import forget
 
 if TYPE_CHECKING:
     pass
@@ -75,6 +76,6 @@ def fit(
         job.write(folder / "fit.csv", found)
         job.draw(folder / "fit.png", found)
         tables.write_rows(folder / "posterior.csv", found.posterior.rows())
-        job.forget(folder)
+        forget(folder)
     show(tables.fit(job.rows(found, found.observed)))
     click.echo(f"up to {budget} parameter sets; {', '.join(files)} are in {folder}")

@@ -23,6 +23,7 @@ from rigdda.app.terminal import (
     seed_option,
     show,
 )
+from rigdda.app.unfinished import forget
 
 if TYPE_CHECKING:
     pass
@@ -80,7 +81,7 @@ def sensitivity(
         found = job.run(asked, folder, tick)
         tick(asked.size, "tables and picture")
         sensitivity_report.write(folder, found)
-        job.forget(folder)
+        forget(folder)
     for line, table in sensitivity_report.tables(found):
         click.echo(line)
         show(table)

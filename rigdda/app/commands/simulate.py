@@ -22,6 +22,7 @@ from rigdda.app.terminal import (
     show,
     warn_of_placeholders,
 )
+from rigdda.app.unfinished import forget
 
 if TYPE_CHECKING:
     pass
@@ -101,7 +102,7 @@ def simulate(
         found.run.save(folder / "run.npz")
         passing = Passing.of(where, barriers, event, found.passages)
         rows, rest = simulation_report.write(folder, passing, barriers, asked)
-        job.forget(folder)
+        forget(folder)
     show(tables.outcomes(where, barriers, found.outcomes, stations.stopped(rest)))
     for line, table in stations.tables(rows):
         click.echo(line)

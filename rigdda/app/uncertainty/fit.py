@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import shutil
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -32,7 +31,6 @@ import rigdda
 from rigdda import MECHANICS, BadInput, Site, release_many
 from rigdda.app.reports.stations import QUANTITIES
 from rigdda.app.reports.tables import write_rows
-from rigdda.app.simulate import PARTS
 from rigdda.app.uncertainty.observations import (
     DEPOSIT,
     LEAST_VALUES,
@@ -42,6 +40,7 @@ from rigdda.app.uncertainty.observations import (
 )
 from rigdda.app.uncertainty.parameters import Parameter, Posterior, check_once, with_values
 from rigdda.app.uncertainty.score_surface import best_places
+from rigdda.app.unfinished import PARTS
 from rigdda.envs.outcome_cache import fingerprint
 from rigdda.files import atomic
 from rigdda.lumped_mass import lumped
@@ -461,11 +460,6 @@ def _read(file: Path, sets: DataSets) -> dict[str, Floats] | None:
             return {name: stored[key] for name, key in zip(sets, _columns(sets), strict=True)}
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
         return None
-
-
-def forget(out: Path) -> None:
-    """Remove the computed values of a fit whose tables are written."""
-    shutil.rmtree(out / PARTS, ignore_errors=True)
 
 
 def search(

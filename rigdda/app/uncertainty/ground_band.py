@@ -9,7 +9,6 @@ are evaluated on the same releases.
 from __future__ import annotations
 
 import math
-import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +20,6 @@ from numpy.typing import NDArray
 
 from rigdda import Layout, Site
 from rigdda.app.design_study import DesignStudy, design_events
-from rigdda.app.simulate import PARTS
 from rigdda.app.uncertainty.parameters import (
     Input,
     Posterior,
@@ -228,8 +226,3 @@ def _case(name: str, site: Site, layout: Layout, found: SimulatedSite) -> BandLa
     """Return a layout on one ground."""
     evaluation = judge(site, layout, found.outcomes, {}, {})
     return BandLayout(name, evaluation, price(site, layout, found))
-
-
-def forget(out: Path) -> None:
-    """Remove the outcomes of a band whose tables are written."""
-    shutil.rmtree(out / PARTS, ignore_errors=True)

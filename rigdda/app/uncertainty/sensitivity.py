@@ -24,7 +24,6 @@ Variance based sensitivity analysis of model output, Computer Physics Communicat
 from __future__ import annotations
 
 import math
-import shutil
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -38,7 +37,6 @@ from rigdda import BadInput, Layout, Site, check
 from rigdda.agents.limits import JOB_RELEASES
 from rigdda.app.uncertainty.parameters import Input, Parameter, site_at
 from rigdda.app.uncertainty.varied_sites import (
-    PARTS,
     Priced,
     Seeds,
     noise,
@@ -514,8 +512,3 @@ def _outputs(
                 yield Output(
                     f"{words} of {event.name}", "-", Response(share.sum(axis=1), share, strata)
                 )
-
-
-def forget(out: Path) -> None:
-    """Remove the outcomes of an analysis whose tables are written."""
-    shutil.rmtree(out / PARTS, ignore_errors=True)

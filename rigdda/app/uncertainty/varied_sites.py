@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import rigdda
 from rigdda import MECHANICS, Layout, Outcome, Site
-from rigdda.app.simulate import PARTS
+from rigdda.app.unfinished import PARTS
 from rigdda.envs import outcome_cache
 from rigdda.envs.cost import account
 from rigdda.files import atomic

@@ -1,0 +1,65 @@
+"""Results folders: files of the user and of other commands are not overwritten."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from processes import refused, run
+
+from rigdda import Site
+
+LAYOUT = """[[barriers]]
+kind = "ditch"
+x = 29.5
+depth = 1.0
+width = 3.0
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    Site.load("quick").save(tmp_path / "site.toml")
+    (tmp_path / "layout.toml").write_text(LAYOUT, encoding="utf-8")
+    return tmp_path
+
+
+def simulate(folder: Path, out: str, *more: object) -> str:
+    return run("simulate", "site.toml", "--releases", 1, "--out", out, *more, folder=folder)
+
+
+def test_a_folder_parts_of_the_user_is_kept(folder: Path) -> None:
+    own = folder / "results/parts/fence_parts.txt"
+    own.parent.mkdir(parents=True)
+    own.write_text("posts", encoding="utf-8")
+    simulate(folder, "results")
+    assert own.read_text(encoding="utf-8") == "posts"
+
+
+def test_a_command_may_be_repeated_in_its_folder(folder: Path) -> None:
+    simulate(folder, "results")
+    simulate(folder, "results", "--layout", "layout.toml")
+
+
+def test_results_of_another_command_are_not_overwritten(folder: Path) -> None:
+    simulate(folder, "results")
+    before = (folder / "results/section.png").read_bytes()
+    (folder / "results/run.json").write_text(
+        (folder / "results/run.json").read_text(encoding="utf-8").replace(
+            '"simulate"', '"design"'
+        ), encoding="utf-8",
+    )  # fmt: skip
+    line = refused("simulate", "site.toml", "--releases", 1, "--out", "results", folder=folder)
+    assert "`rigdda design` wrote this file: name another folder" in line
+    assert (folder / "results/section.png").read_bytes() == before
+
+
+def test_an_input_in_the_results_folder_is_not_overwritten(folder: Path) -> None:
+    (folder / "seen.csv").write_text("event,run_out_m\nblock,30\nblock,31\nblock,33\n")
+    before = (folder / "site.toml").read_bytes()
+    line = refused(
+        "fit", "site.toml", "seen.csv", "--parameters", "surfaces.rock.friction_deg=25:45",
+        "--out", ".", folder=folder,
+    )  # fmt: skip
+    assert "site.toml" in line and "not a result of `rigdda fit`: name another folder" in line
+    assert (folder / "site.toml").read_bytes() == before

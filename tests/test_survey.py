@@ -120,6 +120,12 @@ def test_the_profile_of_a_site_is_that_of_its_survey(
         "0,92,top\n10,90,edge\n120,3,road\n160,0,end\n",
         "z,x\n92,0\n90,10\n3,120\n0,160\n",
         "x;y\n0,0;9,2e1\n1e1;90\n+120;3,0\n160;0\n",
+        "x,y,remark\n0,92,top\n10,90,\n120,3\n160,0,end\n",  # rows without a remark
+        "x,y\n0,92,\n10,90,\n120,3,\n160,0,\n",
+        "0,92\n10,90,edge\n120,3,\n160,0\n",
+        "0 92\n10 90 upper edge\n120 3\n160 0\n",
+        "x;y;code\n0;92\n10;90;7\n120;3;\n160;0\n",
+        "code\tx\ty\tdip\n\t0\t92\t\n2\t10\t90\t\n\t120\t3\t25\n4\t160\t0\t\n",
     ],
 )
 def test_tables_as_programs_write_them(text):
@@ -321,6 +327,26 @@ def test_what_could_be_read_in_two_ways_is_refused(text, part):
     with pytest.raises(BadInput) as caught:
         parse_table("survey.csv", text)
     assert part in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "row"),
+    [
+        ("0,45\n9,35\n16,20,5\n35,-0,5\n", 3, "16,20,5"),
+        ("0,45\n9,5,35\n16,20,5\n35,-0,5\n", 2, "9,5,35"),
+        ("x,y,remark\n0,45,\n9,35,edge\n16,20,5,\n35,0,\n", 4, "16,20,5,"),
+        ("x,y,remark\n0,45,1,\n9,35,2,\n16,20,5,\n35,0,5,\n", 2, "0,45,1,"),
+        ("x,y,remark\n0,45\n9,35\n16,20,5\n35,0\n", 4, "16,20,5"),
+        ("0,45,top\n9,35,edge\n16,20,5,gully\n35,0,end\n", 3, "16,20,5,gully"),
+        ("0 1 245\n16 990\n35 975\n", 1, "0 1 245"),
+        ("1;0;92\n2;10;90\n120;3\n160;0\n", 1, "1;0;92"),
+    ],
+)
+def test_a_number_too_many_in_some_rows_is_refused(text, line, row):
+    with pytest.raises(BadInput, match="same number of cells.*semicolons") as caught:
+        parse_table("survey.csv", text)
+    assert caught.value.field == f"survey.csv line {line}"
+    assert caught.value.value == row
 
 
 def test_tables_with_a_stated_separator_and_with_stations():

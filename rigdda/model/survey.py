@@ -102,6 +102,9 @@ OFF_LINE = 0.02
 """Distance of a point from the straight line between the ends of a profile in plan, over its
 length, above which chainage is measured along the points."""
 
+UNAMBIGUOUS = ("\t", ";")
+"""Separators of columns that never stand within a number."""
+
 NAME_COLUMNS = (
     "name its columns in the first line: chainage and elevation, or easting, northing and "
     "elevation; distances along the slope and numbers of points are no chainages; with decimal "
@@ -187,6 +190,8 @@ def parse_table(name: str, text: str) -> Survey:
     if not body:
         raise BadInput(name, "no numbers", "give at least two rows of chainage and elevation [m]")
     columns = _named(name, rows[0]) if head else _unnamed(name, body)
+    if separator not in UNAMBIGUOUS or not head:
+        _check_lengths(name, separator, head, body, columns)
     if units is not None:
         _check_units(name, *units, columns)
     _check_decimal_signs(name, separator, body, columns)
@@ -210,15 +215,17 @@ def _rows(name: str, text: str) -> tuple[str | None, list[tuple[int, list[str]]]
     The cells of a line stand beside its number.
     """
     lines = [
-        (i, line.strip())
+        (i, line)
         for i, line in enumerate(text.splitlines(), 1)
         if line.strip(" ,;\t") and not line.lstrip().startswith("#")
     ]
-    stated = re.fullmatch(r"(?i)sep=(.)", lines[0][1]) if lines else None
+    stated = re.fullmatch(r"(?i)sep=(.)", lines[0][1].strip()) if lines else None
     lines = lines[1:] if stated else lines
     if not lines:
         raise BadInput(name, "empty", "give a table of chainage and elevation [m]")
-    separator = stated[1] if stated else _separator([line for _, line in lines])
+    separator = stated[1] if stated else _separator([line.strip() for _, line in lines])
+    if separator != "\t":  # leading and trailing tabs are the separators of empty cells
+        lines = [(i, line.strip()) for i, line in lines]
     try:
         if separator is None:
             return separator, [(i, line.split()) for i, line in lines]
@@ -392,6 +399,32 @@ def _check_decimal_signs(
                     f"{one if text == other else other}"
                 )
                 raise BadInput(where, text, hint)
+
+
+def _check_lengths(
+    name: str,
+    separator: str | None,
+    head: Sequence[str],
+    body: Sequence[tuple[int, list[str]]],
+    columns: Sequence[tuple[str, int]],
+) -> None:
+    """Check that rows of different lengths differ only in texts, such as remarks.
+
+    A number too many in some of the rows is often the part after a decimal comma.
+    """
+    lengths = {len(cells) for cells in ([head] if head else []) + [cells for _, cells in body]}
+    if len(lengths) == 1:
+        return
+    last = max(at for _, at in columns)
+    usual = len(head) or min(lengths)
+    further = [row for row in body if any(map(_looks_numeric, row[1][last + 1 :]))]
+    if further:
+        line, cells = min(further, key=lambda row: len(row[1]) == usual)
+        hint = (
+            "give every row the same number of cells, also where the last ones are empty; with "
+            "decimal commas separate columns by semicolons"
+        )
+        raise BadInput(f"{name} line {line}", (separator or " ").join(cells), hint)
 
 
 def _number(name: str, line: int, cells: Sequence[str], what: str, at: int) -> float:

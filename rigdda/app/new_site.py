@@ -517,18 +517,22 @@ class _Draft:
 
     def _grounds(self) -> tuple[str, list[dict[str, Any]], dict[str, str]]:
         """Return the surface outside the stretches, the stretches, and the grounds."""
-        origin, base, given = self.profile.origin, None, []
+        base, given = None, []
         grounds = {"rock": USUAL["rock"], "soil": USUAL["soil"]}
         for text in self.request.grounds:
-            word, span = _ranged("--ground", text, origin)
+            word, span = _ranged("--ground", text, self.profile.origin)
             surface, ground = _library(word)
-            grounds[surface] = ground
-            self.named.add(surface)
-            if span is None:
+            if span is not None:
+                self._check_on_profile(text, span)
+                given.append((span, surface))
+            elif base is None:
                 base = surface
             else:
-                given.append((span, surface))
-        _check_apart(given, origin)
+                hint = f"give it a range, such as {word}:12-30: {base} is that of all other ground"
+                raise BadInput("--ground", text, hint)
+            grounds[surface] = ground
+            self.named.add(surface)
+        _check_apart(given, self.profile.origin)
         grounds["asphalt"] = USUAL["asphalt"]
         ends = [at for span, _ in given for at in span]
         low, high = float(self.x[0]), float(self.x[-1])
@@ -551,6 +555,14 @@ class _Draft:
             if surface != main
         ]
         return main, stretches, grounds
+
+    def _check_on_profile(self, text: str, span: Span) -> None:
+        """Check that a stretch of ground lies on the profile."""
+        ends = float(self.x[0]), float(self.x[-1])
+        if not ends[0] <= span[0] < span[1] <= ends[1]:
+            first, last = sorted(map(self.profile.origin.chainage_of, ends))
+            hint = f"put it on the profile, chainage {first:.10g} to {last:.10g} of the survey"
+            raise BadInput("--ground", text, hint)
 
     def _surface(self, name: str) -> Part:
         """Return the table of a surface: its ground, and what the library has for it."""

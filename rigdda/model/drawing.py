@@ -84,7 +84,7 @@ def _polylines(path: Path) -> tuple[int, list[Any]]:
             if line.dxftype() != "POLYLINE" or line.is_2d_polyline or line.is_3d_polyline
         ]
         return int(document.header.get("$INSUNITS", 0)), lines
-    except (OSError, ValueError, LookupError, ezdxf.DXFError) as error:
+    except Exception as error:  # a damaged file causes any: StopIteration if it is cut off
         words = " ".join(str(error).split())[:80] or type(error).__name__
         raise BadInput("--profile", str(path), f"save it as DXF again ({words})") from None
 

@@ -247,8 +247,12 @@ def test_a_drawing_becomes_a_site(tmp_path):
     assert other.origin.azimuth_deg == pytest.approx(36.869898, abs=1e-3)
     (tmp_path / "broken.dxf").write_text("  0\nSECTION\n  2\nENTITIES\n  x\n")
     (tmp_path / "text.dxf").write_text("chainage,elevation\n0,1\n")
+    (tmp_path / "begun.dxf").write_text("0\nSECTION\n")
+    whole = (tmp_path / "flat.dxf").read_text().splitlines(keepends=True)
+    (tmp_path / "half.dxf").write_text("".join(whole[: len(whole) // 2]))
     ezdxf.new().saveas(tmp_path / "empty.dxf")
     for name, mend in (("broken", "save it as DXF again"), ("text", "save it as DXF again"),
+                       ("begun", "save it as DXF again"), ("half", "save it as DXF again"),
                        ("empty", "one polyline"), ("missing", "name a file")):  # fmt: skip
         assert mend in refused("new", "a", "--profile", f"{name}.dxf", folder=tmp_path)
 
@@ -329,6 +333,12 @@ OPTIONS = {
     "ground of bad number": ((*ASKED, "--ground", "talus:1.2.3-20"), "1.2.3"),
     "grounds that overlap": (
         (*ASKED, "--ground", "talus:10-30", "--ground", "meadow:20-40"), "talus ends",
+    ),
+    "ground beyond the profile": ((*ASKED, "--ground", "talus:200-300"), "chainage 0 to 161"),
+    "ground before the crest": ((*ASKED, "--ground", "talus:-5-30"), "'talus:-5-30'"),
+    "two grounds without range": (
+        (*ASKED, "--ground", "talus", "--ground", "talus:0-10", "--ground", "soil"),
+        "--ground = 'soil': give it a range, such as soil:12-30: talus is that of all other ground",
     ),
     "source without range": ((*ASKED, "--source", "cliff"), "cliff:2-8"),
     "source on the road": ((*ASKED, "--source", "cliff:100-115"), "uphill of the road"),

@@ -87,6 +87,12 @@ def test_unknown_keys_are_refused_at_every_depth(old, new, tmp_path):
         ("embankment = 110.0", "fence = { 750 = 300.0 }", "prices.fence", "1000"),
         ("embankment = 110.0", "ditch = { sole = 5.0 }", "prices.ditch", "rock, soil"),
         ("[road]", "[lumped.sole]\nnormal = 0.3\n\n[road]", "lumped", "rock"),
+        (
+            "[road]",
+            "[lumped.rock]\nfriction_deg = 0.5\n\n[road]",
+            "lumped.rock.friction_deg",
+            "give degrees, such as 30: 0.5 looks like a tangent or radians",
+        ),
         ("[61.0, -3.0]", "[61000.0, -3.0]", "slope.points", "give metres"),
         (
             "[road]",

@@ -168,6 +168,15 @@ def test_individual_risk_of_a_passage_is_that_of_one_vehicle() -> None:
     assert fatal * one.person == pytest.approx(by_hand, rel=1e-12)
 
 
+@pytest.mark.parametrize(("vehicles", "occupancy"), [(2.0, 1.0), (2.0, 1.5), (4.0, 0.5)])
+def test_the_risk_of_one_person_is_at_most_that_of_all(vehicles: float, occupancy: float) -> None:
+    """Who is in every vehicle that has a person in it shares its risk with the other persons."""
+    alone = _with(vehicles_per_day=vehicles, occupancy=occupancy, commuter_trips=730.0)
+    assert alone.person == pytest.approx(1.0 / max(1.0, occupancy), rel=1e-12)
+    with pytest.raises(BadInput, match="commuter_trips = 731"):
+        msgspec.structs.replace(alone, commuter_trips=731.0)
+
+
 def test_fatalities_are_priced_into_z(site: Site) -> None:
     hit = outcome("block", 1.2, 1.0, 1.2, 0.0)
     before = site.bill((), hit).harm

@@ -228,6 +228,14 @@ def _odd_surfaces(site: Site) -> Iterator[str]:
                     f"interfaces[{i}].{law} = {value:g}: up to {high:g} is plausible for {whose}; "
                     "correct it"
                 )
+    low, high, whose = _plausible("", "friction_deg")
+    for name, rebound in site.lumped.items():
+        angle = rebound.friction_deg
+        if angle != 0.0 and not low <= angle <= high:
+            yield (
+                f"lumped.{name}.friction_deg = {angle:g}: {low:g} to {high:g} is plausible for "
+                f"{whose}; correct it"
+            )
 
 
 def _plausible(ground: str, law: str) -> tuple[float, float, str]:

@@ -232,15 +232,14 @@ class Interface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         )
 
 
-def check_surface(where: str, surface: Surface) -> None:
-    """Check that the friction angle of a surface is plausible.
+def check_friction(where: str, angle: float) -> None:
+    """Check that a friction angle [deg] of the table `where` is plausible.
 
     Raises
     ------
     BadInput
         If it looks like a tangent or an angle in radians.
     """
-    angle = surface.friction_deg
     if 0.0 < angle < 1.0:
         hint = f"give degrees, such as 30: {angle:g} looks like a tangent or radians"
         raise BadInput(f"{where}.friction_deg", angle, hint)

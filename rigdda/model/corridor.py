@@ -36,6 +36,9 @@ from rigdda.model.traffic import Traffic
 MOST_SECTIONS = 10_000
 """Maximum number of sections of a corridor."""
 
+LARGEST_BUDGET = 1e12
+"""Maximum budget [EUR, EUR/year]."""
+
 FOLDER = resources.files("rigdda") / "sites" / "corridors"
 """Folder with the files of the built-in corridors."""
 
@@ -124,7 +127,7 @@ class CorridorFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         float,
         about(
             "Greatest annual cost of all barriers: annuities and upkeep.", "EUR/year", ge=0.0,
-            le=1e12,
+            le=LARGEST_BUDGET,
         ),
     ] | None = None  # fmt: skip
     prices: Annotated[
@@ -201,7 +204,8 @@ class Corridor(msgspec.Struct, frozen=True):
     Raises
     ------
     BadInput
-        If there is no section, two sections have the same name, or a budget is invalid.
+        If there is no section, two sections have the same name, or a value is of the wrong type or
+        outside its range.
     """
 
     name: str
@@ -210,14 +214,25 @@ class Corridor(msgspec.Struct, frozen=True):
     yearly_budget: float | None = None
 
     def __post_init__(self) -> None:
-        if not 1 <= len(self.sections) <= MOST_SECTIONS:
+        _set = msgspec.structs.force_setattr
+        if not isinstance(self.name, str):
+            raise BadInput("name", self.name, "give a text")
+        what = "rigdda.CorridorSection"
+        sections = check.sequence("sections", self.sections, CorridorSection, what)
+        _set(self, "sections", sections)
+        if not 1 <= len(sections) <= MOST_SECTIONS:
             hint = f"give 1 to {MOST_SECTIONS:,} sections"
-            raise BadInput("sections", len(self.sections), hint)
-        names = [section.name for section in self.sections]
+            raise BadInput("sections", len(sections), hint)
+        names = [section.name for section in sections]
         for name in names:
             if names.count(name) > 1:
                 raise BadInput("sections.name", name, "give each section a name of its own")
-        msgspec.structs.force_setattr(self, "budgets", checked_budgets("budgets", self.budgets))
+        _set(self, "budgets", checked_budgets("budgets", self.budgets))
+        if self.yearly_budget is not None:
+            yearly = check.number(
+                "yearly_budget", self.yearly_budget, 0.0, LARGEST_BUDGET, unit="EUR/year"
+            )
+            _set(self, "yearly_budget", yearly)
 
     @property
     def length(self) -> float:
@@ -301,7 +316,7 @@ def checked_budgets(field: str, budgets: Any) -> tuple[float, ...]:
     given = budgets if isinstance(budgets, list | tuple) else [budgets]
     if not given:
         raise BadInput(field, budgets, "give at least one budget in EUR")
-    return tuple(sorted({check.number(field, value, 0.0, 1e12, unit="EUR") for value in given}))
+    return tuple(sorted({check.number(field, value, 0.0, LARGEST_BUDGET, unit="EUR") for value in given}))
 
 
 def _corridor(data: dict[str, Any], folder: Path) -> Corridor:
@@ -310,6 +325,9 @@ def _corridor(data: dict[str, Any], folder: Path) -> Corridor:
     if bool(file.table) == bool(file.sections):
         hint = 'give either tables [[sections]] or table = "sections.csv"'
         raise BadInput("sections", len(file.sections), hint)
+    if file.traffic and "section_length" in file.traffic:
+        hint = "leave it out: it is the length of each section"
+        raise BadInput("traffic.section_length", file.traffic["section_length"], hint)
     tables = _rows(folder / file.table) if file.table else file.sections
     sites: dict[str, Site] = {}
     sections = []
@@ -323,7 +341,7 @@ def _corridor(data: dict[str, Any], folder: Path) -> Corridor:
         name = table.name or table.site.removesuffix(".toml")
         site = sites[table.site]
         if file.traffic is not None:
-            given = {"section_length": table.length, **file.traffic}
+            given = {**file.traffic, "section_length": table.length}
             site = msgspec.structs.replace(site, traffic=fields.read(Traffic, given, "traffic"))
         targets = {key: getattr(table, key) for key in TARGETS}
         sections.append(CorridorSection(site, table.length, name, **targets))

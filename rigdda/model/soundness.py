@@ -13,7 +13,7 @@ from rigdda import check, fields
 from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.geometry import overlap
 from rigdda.ground.prices import DITCHES
-from rigdda.ground.surface import check_surface
+from rigdda.ground.surface import check_friction
 from rigdda.model import loose_blocks
 from rigdda.model.settings import Settings
 from rigdda.model.site_tables import SiteTables
@@ -94,7 +94,7 @@ def check_names(field: str, names: Iterable[str]) -> None:
 
 def _check_surfaces(site: SiteTables) -> None:
     for name, surface in site.surfaces.items():
-        check_surface(f"surfaces.{name}", surface)
+        check_friction(f"surfaces.{name}", surface.friction_deg)
     check.one_of("slope.surface", site.slope.surface, site.surfaces)
     for i, stretch in enumerate(site.slope.surfaces):
         check.one_of(f"slope.surfaces[{i}].surface", stretch.surface, site.surfaces)
@@ -102,14 +102,15 @@ def _check_surfaces(site: SiteTables) -> None:
         fields.check(pair, f"interfaces[{i}].")
         check.one_of(f"interfaces[{i}].first", pair.first, site.surfaces)
         check.one_of(f"interfaces[{i}].second", pair.second, site.surfaces)
-        check_surface(f"interfaces[{i}]", pair.surface)
+        check_friction(f"interfaces[{i}]", pair.friction_deg)
     pairs = [frozenset((pair.first, pair.second)) for pair in site.interfaces]
     for i, names in enumerate(pairs):
         if names in pairs[:i]:
             hint = "give each pair of surfaces only once, in either order"
             raise BadInput(f"interfaces[{i}]", " and ".join(sorted(names)), hint)
-    for name in site.lumped:
+    for name, rebound in site.lumped.items():
         check.one_of("lumped", name, site.surfaces)
+        check_friction(f"lumped.{name}", rebound.friction_deg)
     for name in site.prices.ditch:
         check.one_of("prices.ditch", name, {*site.surfaces, *DITCHES})
     for source in site.sources:

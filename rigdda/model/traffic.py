@@ -52,6 +52,9 @@ Floats = NDArray[np.float64]
 DAYS_PER_YEAR = 365.0
 """Days per year."""
 
+ROUNDING = 1e-9
+"""Relative tolerance for the number of passages of one person."""
+
 REACTION, DECELERATION = 2.5, 3.4
 """Reaction time [s] and deceleration [m/s2] of the stopping sight distance of AASHTO (A Policy on
 Geometric Design of Highways and Streets)."""
@@ -97,7 +100,8 @@ class Traffic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ------
     BadInput
         If a value is of the wrong type or outside its range, the sizes of `vulnerability` do not
-        increase, or both `decision_sight_distance` and `run_into` are given.
+        increase, both `decision_sight_distance` and `run_into` are given, or one person travels the
+        section more often than all vehicles together.
     """
 
     vehicles_per_day: Annotated[
@@ -170,7 +174,7 @@ class Traffic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         float,
         about(
             "Number of times per year that one person travels the section, for the individual "
-            "risk.",
+            "risk. It is at most that of all vehicles.",
             "1/year",
             ge=0.0,
             le=1e5,
@@ -191,6 +195,14 @@ class Traffic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if self.decision_sight_distance is not None and self.run_into is not None:
             hint = "leave it out: the decision_sight_distance says how many vehicles cannot stop"
             raise BadInput("traffic.run_into", self.run_into, hint)
+        most = DAYS_PER_YEAR * self.vehicles_per_day * min(1.0, self.occupancy)
+        if self.commuter_trips > most * (1.0 + ROUNDING):
+            hint = (
+                f"give at most {most:g}, the passages in a year of all vehicles with a person in "
+                f"them: vehicles_per_day is {self.vehicles_per_day:g} and occupancy "
+                f"{self.occupancy:g}"
+            )
+            raise BadInput("traffic.commuter_trips", self.commuter_trips, hint)
         if self.vulnerability is None:
             if self.vulnerability_by == "energy":
                 hint = "also give traffic.vulnerability as pairs [energy in kJ, probability]"

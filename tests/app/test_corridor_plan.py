@@ -297,6 +297,17 @@ def test_a_target_of_the_risk_to_life_needs_traffic(tmp_path: Path) -> None:
     assert "traffic.vehicles_per_day" in refused("corridor", "pass.toml", folder=tmp_path)
 
 
+def test_traffic_of_a_corridor_takes_the_length_of_each_section(tmp_path: Path) -> None:
+    traffic = "[traffic]\nvehicles_per_day = 900\nspeed = 50.0\n"
+    (tmp_path / "pass.toml").write_text(TEXT + traffic)
+    for section in Corridor.load(tmp_path / "pass.toml").sections:
+        assert section.site.traffic is not None
+        assert section.site.traffic.section_length == section.length
+    (tmp_path / "pass.toml").write_text(TEXT + traffic + "section_length = 9999\n")
+    line = refused("corridor", "pass.toml", folder=tmp_path)
+    assert "traffic.section_length = 9999: leave it out" in line
+
+
 def test_options_are_judged_by_the_risk_to_life() -> None:
     corridor = Corridor.load(EXAMPLE)
     problem = CorridorProblem(corridor).problems[3]

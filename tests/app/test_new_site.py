@@ -21,7 +21,7 @@ from rigdda.ground.grounds import GROUNDS
 from rigdda.ground.surface import Interface
 from rigdda.model.existing import Existing
 from rigdda.model.forest import Forest
-from rigdda.model.site_tables import Motion
+from rigdda.model.site_tables import Motion, Rebound
 from rigdda.model.traffic import Traffic
 
 GRID = """chainage,elevation
@@ -501,6 +501,14 @@ def test_a_surface_without_a_ground_is_compared_with_all_grounds(slope):
     assert [line.partition(":")[0] for line in found] == [
         "interfaces[0].restitution = 0.85", "interfaces[0].rolling = 0.9",
     ]  # fmt: skip
+
+
+def test_an_unusual_friction_of_the_lumped_mass_model_looks_odd(slope):
+    for angle in (0.0, 30.0):
+        usual = replace(slope, lumped={"rock": Rebound(friction_deg=angle)})
+        assert oddities(usual) == []
+    (line,) = oddities(replace(slope, lumped={"rock": Rebound(friction_deg=1.2)}))
+    assert line.startswith("lumped.rock.friction_deg = 1.2: ") and "correct it" in line
 
 
 def test_rolling_above_one_is_refused(tmp_path):

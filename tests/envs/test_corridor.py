@@ -130,6 +130,29 @@ def test_sections_of_a_corridor_are_all_played() -> None:
 
 
 @pytest.mark.parametrize(
+    "values, named",
+    [
+        ({"name": 3}, "name = 3: give a text"),
+        ({"sections": None}, "sections = None: give a sequence of rigdda.CorridorSection"),
+        ({"sections": (3,)}, r"sections\[0\] = 3: give rigdda.CorridorSection only"),
+        ({"sections": ()}, "sections = 0: give 1 to 10,000"),
+        ({"budgets": ()}, "budgets = "),
+        ({"yearly_budget": -5}, "yearly_budget = -5: .* at least 0 .*EUR/year"),
+        ({"yearly_budget": "a"}, "yearly_budget = 'a': give a number"),
+        ({"yearly_budget": math.nan}, "yearly_budget = nan: give a finite number"),
+    ],
+)
+def test_malformed_corridors(values: dict[str, object], named: str) -> None:
+    sections = [CorridorSection(Site.load("quick"), 10.0, "km 0")]
+    sound = {"name": "small", "sections": sections, "budgets": [2e4, 1e4], "yearly_budget": 300}
+    corridor = Corridor(**sound)
+    assert corridor.sections == tuple(sections) and corridor.budgets == (1e4, 2e4)
+    assert isinstance(corridor.yearly_budget, float)
+    with pytest.raises(BadInput, match=named):
+        Corridor(**sound | values)
+
+
+@pytest.mark.parametrize(
     "keywords, named",
     [
         ({"site": []}, "site"),

@@ -14,6 +14,9 @@ as for lower and upper bounds."""
 FORM = re.compile(r"\+?,?\.(?P<digits>\d+)(?P<kind>[fg])$")
 """Form of a number as in format strings: fixed digits (f) or significant figures (g)."""
 
+GRID = 1e4
+"""Chainage from which six figures are less than two decimals [m]."""
+
 EXACT = Context(prec=800)
 """Context with more digits than any floating-point number has."""
 
@@ -47,6 +50,11 @@ def rounded(value: float | Decimal, form: str, rounding: Rounding = "nearest") -
     way = ROUND_FLOOR if rounding == "down" else ROUND_CEILING
     found = exact.quantize(Decimal((0, (1,), last)), rounding=way, context=EXACT)
     return f"{float(found) + 0.0:{form}}"
+
+
+def chainage(value: float) -> str:
+    """Return a chainage [m] as text: with six figures, or with two decimals if it is large."""
+    return f"{value:g}" if abs(value) < GRID else f"{value:.2f}".rstrip("0").removesuffix(".")
 
 
 def between(low: float, high: float, form: str) -> str:

@@ -25,6 +25,7 @@ from rigdda import (
 )
 from rigdda.barriers import KINDS, describe
 from rigdda.measurement import stations
+from rigdda.model.scene import scene_from_json, scene_to_json
 from rigdda.replay.recording import Marks
 
 QUICK = Site.load("quick")
@@ -62,6 +63,20 @@ def test_a_table_without_kind_is_a_wall(tmp_path):
         ('kind = "ditch"\nx = 1.0\ndepth = "1.0"\nwidth = 3.0', ["barriers[0]", "depth"]),
         ('x = "1.0"\nheight = 1.0', ["barriers[0].x", "give a number"]),
         ('kind = "gravity_wall"\nx = 1.0\nheight = 1.0\ndensity = nan', ["barriers[0].density"]),
+        (
+            'kind = "gravity_wall"\nx = 1.0\nheight = 1.0\ndensity = 2.4',
+            ["barriers[0].density = 2.4", "at least 500 and at most 100000 [kg/m3]"],
+        ),
+        (
+            'kind = "embankment"\nx = 1.0\nheight = 1.0\ndensity = 1.9',
+            ["barriers[0].density = 1.9", "at least 200 and at most 100000 [kg/m3]"],
+        ),
+        ('kind = "embankment"\nx = 1.0\nheight = 1.0\ndensity = 1e15', ["barriers[0].density"]),
+        (
+            'kind = "mesh"\nx = 1.0\noption = "face"\n[[barriers]]\nkind = "mesh"\nx = 2.0\n'
+            'option = "face"',
+            ["barriers[1].option = 'face'", "barriers[0] has it"],
+        ),
         ('kind = "ditch"\nx = 1.0\ndepth = 1.0\nwidth = 3.0\nside_slope = 9.0', ["side_slope"]),
         ("x = 1.0\nheight = 1.0\nheigth = 1.0", ["heigth"]),
         ("x = 1.0\nheight = -1.0", ["barriers[0]", "height"]),
@@ -74,6 +89,15 @@ def test_bad_tables_are_named(text, words, tmp_path):
     line = str(caught.value)
     assert all(word in line for word in words), line
     assert "\n" not in line
+
+
+@pytest.mark.parametrize("barrier", [GravityWall(17.0, 1.5), Embankment(31.0, 0.6)])
+def test_a_barrier_for_a_narrow_event_is_recorded_with_its_density(barrier):
+    """It is dense, as all of an element or of its load's spread resists the width of the event."""
+    narrow = barrier.for_width(0.01)
+    assert narrow.density > 1e5
+    scene = QUICK.scene(QUICK.draw(0, "block"), (narrow,))
+    assert scene_from_json(scene_to_json(scene)).barriers == (narrow,)
 
 
 def test_numbers_are_not_read_from_text():

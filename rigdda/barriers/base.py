@@ -38,6 +38,9 @@ THINNEST, LARGEST = 1e-3, 1e3
 """Least and greatest length of a barrier [m]. Values beyond them are regarded as typing errors, and
 rounding errors would dominate thinner faces."""
 
+DENSEST = 1e5
+"""Greatest density of a barrier [kg/m3]."""
+
 Metres = Annotated[float, about(ge=THINNEST, le=LARGEST)]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from rigdda.barriers.base import (
     CATALOGUE_HEIGHTS,
+    DENSEST,
     Barrier,
     Earthwork,
     Floats,
@@ -26,6 +27,9 @@ from rigdda.errors import BadInput
 from rigdda.fields import about, documented
 from rigdda.ground.barrier_zone import BarrierZone
 from rigdda.ground.terrain import Terrain
+
+LIGHTEST_FILL = 200.0
+"""Least density of a fill [kg/m3]. Expanded clay has 300; a value such as 1.9 is in t/m3."""
 
 CREST = 1.0
 """Minimum width of the crest of an embankment in a search [m], so that a machine can build it."""
@@ -59,7 +63,10 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
         ),
     ] = 0.5
     density: Annotated[
-        float, about("Density of the fill; 1900 for compacted soil.", "kg/m3", gt=0.0)
+        float,
+        about(
+            "Density of the fill; 1900 for compacted soil.", "kg/m3", ge=LIGHTEST_FILL, le=DENSEST
+        ),
     ] = 1900.0
     fails: ClassVar[str] = "pushed"
     fallible: ClassVar[bool] = True

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from rigdda.barriers.base import (
+    DENSEST,
     ELEMENT,
     LIMIT_ROUNDING,
     SLENDER,
@@ -27,6 +28,9 @@ from rigdda.errors import BadInput
 from rigdda.fields import about, documented
 from rigdda.ground.barrier_zone import BarrierZone
 from rigdda.ground.terrain import Terrain
+
+LIGHTEST_WALL = 500.0
+"""Least density of a wall [kg/m3]; a value such as 2.4 is in t/m3."""
 
 SLID = 0.1
 """Displacement of a corner beyond which a gravity wall counts as slid [m]. The elastic deformation
@@ -50,7 +54,10 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
     height: Annotated[Metres, about("Height above the higher end of its base.", "m")]
     thickness: Annotated[Metres, about("Extent downhill of `x`.", "m")] = 1.0
     density: Annotated[
-        float, about("Density of the wall; 2400 for plain concrete.", "kg/m3", gt=0.0)
+        float,
+        about(
+            "Density of the wall; 2400 for plain concrete.", "kg/m3", ge=LIGHTEST_WALL, le=DENSEST
+        ),
     ] = 2400.0
     drawn: ClassVar[Drawn] = "moving"
     fallible: ClassVar[bool] = True
@@ -60,7 +67,7 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
     def for_width(self, width: float) -> Self:
         """Return an equivalent wall for an event of this width [m]; 5 m elements act as units."""
         factor = ELEMENT / min(width, ELEMENT)
-        return msgspec.structs.replace(self, density=self.density * factor)
+        return self._with(density=self.density * factor)
 
     def outline(self, ground: Terrain) -> Floats:
         """Return the (4, 2) initial corners on `ground`.

@@ -90,10 +90,16 @@ def as_layout(layout: Any) -> Layout:
     Raises
     ------
     BadInput
-        If it is not a sequence of barriers.
+        If it is not a sequence of barriers, or has a mesh option twice.
     """
     what = "barriers: rigdda.Wall, GravityWall, Fence, Ditch, Embankment, Mesh or Removal"
-    return check.sequence("layout", layout, Barrier, what)
+    barriers: Layout = check.sequence("layout", layout, Barrier, what)
+    first: dict[str, int] = {}
+    for i, barrier in enumerate(barriers):
+        if isinstance(barrier, Mesh) and first.setdefault(barrier.option, i) != i:
+            hint = f"use each mesh option at most once: barriers[{first[barrier.option]}] has it"
+            raise BadInput(f"barriers[{i}].option", barrier.option, hint)
+    return barriers
 
 
 def from_table(where: str, table: Any) -> Barrier:
@@ -114,6 +120,23 @@ def from_table(where: str, table: Any) -> Barrier:
         return kind(**values)
     except BadInput as bad:
         raise BadInput(f"{where}: {bad.field}", bad.value, bad.hint) from None
+
+
+def from_record(where: str, table: Any) -> Barrier:
+    """Return the barrier of a table of a recorded scene, adapted to the width of an event.
+
+    It may be denser than barriers of layout files, see `Barrier.for_width`.
+
+    Raises
+    ------
+    BadInput
+        As `from_table` does.
+    """
+    if not isinstance(table, dict) or "density" not in table:
+        return from_table(where, table)
+    density = check.number(f"{where}.density", table["density"], 0.0, open_low=True, unit="kg/m3")
+    rest = {name: value for name, value in table.items() if name != "density"}
+    return from_table(where, rest)._with(density=density)
 
 
 def to_tables(layout: Sequence[Barrier]) -> list[dict[str, Any]]:
@@ -147,7 +170,8 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
     Raises
     ------
     BadInput
-        If the file is missing, a field is unknown or a value is outside its range.
+        If the file is missing, a field is unknown, a value is outside its range or a mesh option
+        occurs twice.
     """
     file = Path(path)
     if not file.is_file():
@@ -155,7 +179,7 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
     form = "JSON" if file.suffix == ".json" else "TOML"
     tables = fields.parse("layout", str(path), read("layout", file), form)
     layout = fields.read(_LayoutFile, tables).barriers
-    return tuple(from_table(f"barriers[{i}]", table) for i, table in enumerate(layout))
+    return as_layout([from_table(f"barriers[{i}]", table) for i, table in enumerate(layout)])
 
 
 def save_layout(layout: Sequence[Barrier], path: str | os.PathLike[str]) -> None:

@@ -21,6 +21,7 @@ from rigdda.envs.barrier_formulas import BarrierCheck, checks_of
 from rigdda.envs.design_envelope import DesignEnvelope
 from rigdda.envs.fence_checks import demand_at
 from rigdda.ground.barrier_zone import BarrierZone
+from rigdda.rounding import chainage
 
 
 def narrow_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> Iterator[BadInput]:
@@ -34,7 +35,10 @@ def narrow_gaps(rooms: Sequence[tuple[str, Barrier, Span]]) -> Iterator[BadInput
     ordered = sorted(rooms, key=lambda item: item[2])
     for (_, before, one), (where, barrier, two) in pairwise(ordered):
         if meet(one, two):
-            hint = f"give at least {one[1] + MIN_GAP:g}: {MIN_GAP:g} m clear of the {before.words}"
+            hint = (
+                f"give at least {chainage(one[1] + MIN_GAP)}: {MIN_GAP:g} m clear of the "
+                f"{before.words}"
+            )
             yield BadInput(f"{where}.x", barrier.x, hint)
 
 
@@ -141,7 +145,15 @@ class Rules:
         self, layout: Sequence[Barrier], kinds: Sequence[str], most: int
     ) -> Iterator[BadInput]:
         """Yield an error for each rule that a layout of given kinds and size violates."""
-        barriers = as_layout(layout)
+        try:
+            barriers = as_layout(layout)
+        except BadInput as bad:
+            yield bad
+        else:
+            yield from self._violations(barriers, kinds, most)
+
+    def _violations(self, barriers: Layout, kinds: Sequence[str], most: int) -> Iterator[BadInput]:
+        """Yield what `violations` does of a layout in which no mesh option occurs twice."""
         if len(barriers) > most:
             yield BadInput("layout", f"{len(barriers)} barriers", f"give at most {most}")
         rooms: list[tuple[str, Barrier, Span]] = []
@@ -200,7 +212,7 @@ class Rules:
         """Check that a removal names a removable barrier, and that none before it does."""
         known = [one.x for one in self.site.removals]
         if removal.x not in known:
-            names = " or ".join(f"{x:g}" for x in known) or "no removal: nothing is removable"
+            names = " or ".join(chainage(x) for x in known) or "no removal: nothing is removable"
             raise BadInput(f"{where}.x", removal.x, f"give {names}")
         if removal in before:
             raise BadInput(f"{where}.x", removal.x, "remove it only once")
@@ -210,8 +222,8 @@ class Rules:
         for words, taken in self.fixed:
             if meet(span, taken):
                 hint = (
-                    f"keep it, with its elongation up to {span[1]:g}, {MIN_GAP:g} m clear of the "
-                    f"existing {words} at {taken[0]:g} to {taken[1]:g}"
+                    f"keep it, with its elongation up to {chainage(span[1])}, {MIN_GAP:g} m clear "
+                    f"of the existing {words} at {chainage(taken[0])} to {chainage(taken[1])}"
                 )
                 yield BadInput(f"{where}.x", barrier.x, hint)
 
@@ -312,15 +324,18 @@ class Rules:
         """Yield errors if a barrier is outside the zone or too close to the road."""
         slack = LIMIT_ROUNDING * max(1.0, abs(self.zone.end))
         if not any(low - slack <= start and end <= high + slack for low, high in self.parts):
-            rooms = " or ".join(f"{low:g} to {high:g} m" for low, high in self.parts)
-            hint = f"keep all of it, up to {end:g} m, within {rooms}"
+            rooms = " or ".join(
+                f"{chainage(low)} to {chainage(high)} m" for low, high in self.parts
+            )
+            hint = f"keep all of it, up to {chainage(end)} m, within {rooms}"
             yield BadInput(f"{where}.x", barrier.x, hint)
         road = self.site.road.start
         give = barrier.deflection
         if give > 0.0 and end + give > road + slack:
             most = road - give - barrier.extent
-            hint = f"give at most {most:g}: it deflects by up to {give:g} m"
-            yield BadInput(f"{where}.x", barrier.x, f"{hint}, and the road begins at {road:g}")
+            hint = f"give at most {chainage(most)}: it deflects by up to {give:g} m"
+            told = f"{hint}, and the road begins at {chainage(road)}"
+            yield BadInput(f"{where}.x", barrier.x, told)
 
     def inclination(self, start: float, end: float) -> float:
         """Return the mean inclination of the ground between two chainages [deg]."""

@@ -25,7 +25,7 @@ from rigdda.barriers import (
     Standing,
     Wall,
     earthworks,
-    from_table,
+    from_record,
     to_tables,
 )
 from rigdda.errors import BadInput
@@ -45,6 +45,7 @@ from rigdda.model.loads import (
 )
 from rigdda.model.overlap import check_apart, deepest, in_ground
 from rigdda.model.settings import check_damping
+from rigdda.rounding import chainage
 
 MEMBERS = (
     ("blocks", Block, "rigdda.Block"),
@@ -200,7 +201,10 @@ def checked_stems(
     for i, rows in enumerate(stems):
         table = np.array(rows, dtype=np.float64).reshape(-1, 3)
         for row in table[~((table >= (low, 0.0, 0.0)) & (table <= (high, np.inf, np.inf))).all(1)]:
-            hint = f"give a chainage from {low:g} to {high:g} m, and an energy and a height >= 0"
+            hint = (
+                f"give a chainage from {chainage(low)} to {chainage(high)} m, and an energy and a "
+                "height >= 0"
+            )
             raise BadInput(f"stems[{i}]", row.tolist(), hint)
         found.append(table[np.argsort(table[:, 0], kind="stable")])
     return tuple(found)
@@ -218,7 +222,7 @@ def check_order(scene: Scene) -> None:
     for i, j in pairwise(upright):
         end = scene.barriers[i].end
         if scene.barriers[j].x < end - 1e-9 * max(1.0, abs(end)):
-            hint = f"put it downhill of x = {end:g}, where barriers[{i}] ends"
+            hint = f"put it downhill of x = {chainage(end)}, where barriers[{i}] ends"
             raise BadInput(f"barriers[{j}].x", scene.barriers[j].x, hint)
 
 
@@ -539,7 +543,7 @@ def scene_from_json(text: bytes) -> Scene:
         blocks=tuple(Block(**b) for b in data.pop("blocks")),
         surfaces={name: Surface(**s) for name, s in data.pop("surfaces").items()},
         barriers=tuple(
-            from_table(f"barriers[{i}]", table) for i, table in enumerate(data.pop("barriers"))
+            from_record(f"barriers[{i}]", table) for i, table in enumerate(data.pop("barriers"))
         ),
         interfaces={(a, b): Surface(**s) for a, b, s in data.pop("interfaces")},
         loads=tuple(LOADS[name](**load) for name, load in data.pop("loads")),

@@ -403,12 +403,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             If there is no such event or mesh option, the layout has an option twice, or the rate is
             that of arrivals, see `Event.release_rate`.
         """
-        often, used = self.event(event).release_rate / 100.0, set()
-        for barrier in layout:
+        often = self.event(event).release_rate / 100.0
+        for barrier in as_layout(layout):
             if isinstance(barrier, Mesh):
-                if barrier.option in used:
-                    raise BadInput("mesh option", barrier.option, "use each option at most once")
-                used.add(barrier.option)
                 often *= self.mesh(barrier.option).factors.get(event, 1.0)
         return often
 

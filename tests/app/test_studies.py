@@ -187,6 +187,20 @@ def test_a_bad_study_is_one_line(
     assert set(folder.iterdir()) == before
 
 
+def test_a_mesh_that_occurs_twice_is_refused_before_any_release(folder: Path) -> None:
+    mesh = '{ kind = "mesh", x = 4.0, option = "face" }'
+    text = f'site = "quick"\n[[layouts]]\nname = "two"\nbarriers = [{mesh}, {mesh}]\n'
+    (folder / "study.toml").write_text(text)
+    before = set(folder.iterdir())
+    line = refused("study", "study.toml", folder=folder)
+    assert "layouts.two.barriers[1].option = 'face': use each mesh option at most once" in line
+    twice = f"barriers = [{mesh}, {mesh}]\n"
+    (folder / "layout.toml").write_text(twice)
+    line = refused("simulate", "quick", "--layout", "layout.toml", folder=folder)
+    assert "barriers[1].option = 'face'" in line
+    assert set(folder.iterdir()) == before | {folder / "layout.toml"}
+
+
 def test_a_study_that_is_not_text_is_one_line(folder: Path) -> None:
     (folder / "study.toml").write_bytes(b'site = "\xff"')
     assert "UTF-8" in refused("study", "study.toml", folder=folder)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigdda.errors import BadInput
+from rigdda.rounding import chainage
 
 LARGEST_NUMBER = 1e15
 """Greatest accepted magnitude of a number. No quantity of a slope in SI units comes near it, and
@@ -55,12 +56,18 @@ def number(
     if abs(out) > LARGEST_NUMBER:
         raise BadInput(field, value, f"give a number of at most {LARGEST_NUMBER:g} in magnitude")
     if out < low or out > high or (open_low and out == low):
-        bounds = f"above {low:g}" if open_low else f"of at least {low:g}"
+        bounds = f"above {_bound(low)}" if open_low else f"of at least {_bound(low)}"
         if math.isfinite(high):
-            bounds += f" and at most {high:g}"
+            bounds += f" and at most {_bound(high)}"
         hint = f"give a number {bounds}" + (f" [{unit}]" if unit else "")
         raise BadInput(field, value, hint)
     return out
+
+
+def _bound(value: float) -> str:
+    """Return a bound as text; one that needs more figures than six may be a large chainage."""
+    short = f"{value:g}"
+    return short if float(short) == value else chainage(value)
 
 
 DECIMAL_NUMBER = re.compile(

@@ -56,7 +56,7 @@ def about(
         Inclusive lower bound, exclusive lower bound and inclusive upper bound of a number. Whole
         numbers are at least 0 by default.
     least : int, optional
-        Minimum length of a list.
+        Minimum length of a list or a table.
     choices : iterable, optional
         The permitted values.
     rising : bool
@@ -109,12 +109,28 @@ def parse(what: str, name: str, text: str, form: str = "TOML") -> dict[str, Any]
 def read(table: type[Table], value: Any, where: str = "") -> Table:
     """Return the struct of a table of a file; `where` is the path of the table in the file.
 
+    A struct calls itself by `array`, the array of tables in which it occurs, and its name. Several
+    tables may have the same name by default, so that `where` replaces this path in messages.
+
     Raises
     ------
     BadInput
         As `checked` does, and if fields are inconsistent.
     """
-    return table(**checked(table, value, where))
+    values = checked(table, value, where)
+    try:
+        return table(**values)
+    except BadInput as bad:
+        path = _own_path(table, values)
+        if not (where and path and bad.field.startswith(path)):
+            raise
+        raise BadInput(where + bad.field.removeprefix(path), bad.value, bad.hint) from None
+
+
+def _own_path(table: type[msgspec.Struct], values: Mapping[str, Any]) -> str:
+    """Return how a struct of an array of tables calls itself in messages; empty for others."""
+    array = getattr(table, "array", "")
+    return f"{array}.{values.get('name', _checks(table)['name'][1])}" if array else ""
 
 
 def checked(table: type[msgspec.Struct], value: Any, where: str = "") -> dict[str, Any]:
@@ -177,7 +193,7 @@ def _check(kind: kinds.Type, unit: str = "") -> Check:
         case kinds.VarTupleType(item_type=item):
             return _list(_check(item, unit), kind.min_length or 0)
         case kinds.DictType():
-            return _dict(_check(kind.key_type), _check(kind.value_type, unit))
+            return _dict(_check(kind.key_type), _check(kind.value_type, unit), kind.min_length or 0)
         case kinds.StructType(cls=table):
             return lambda field, value: (
                 value if isinstance(value, table) else read(table, value, field)
@@ -244,10 +260,13 @@ def _list(sound: Check, least: int, most: float = inf) -> Check:
     return members
 
 
-def _dict(key: Check, sound: Check) -> Check:
+def _dict(key: Check, sound: Check, least: int) -> Check:
     def table(field: str, value: Any) -> dict[str, Any]:
         if not isinstance(value, Mapping):
             raise BadInput(field, value, "give a table")
+        if len(value) < least:
+            hint = f"give at least {least} of its keys, or leave the table out to have its default"
+            raise BadInput(field, dict(value), hint)
         return {key(field, name): sound(f"{field}.{name}", item) for name, item in value.items()}
 
     return table

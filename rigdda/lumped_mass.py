@@ -33,6 +33,7 @@ from rigdda.model.settings import EARTH
 from rigdda.model.site import Site
 from rigdda.model.site_tables import Drawn, Rebound
 from rigdda.releases import as_site
+from rigdda.rounding import chainage
 
 Floats = NDArray[np.float64]
 
@@ -103,7 +104,7 @@ def lumped(
         if not isinstance(barrier, Earthwork | Mesh | Removal):
             if i >= new:
                 hint = "use the block model: points only react to ditches and embankments"
-                raise BadInput(f"existing {barrier.words}", f"x = {barrier.x:g}", hint)
+                raise BadInput(f"existing {barrier.words}", f"x = {chainage(barrier.x)}", hint)
             hint = (
                 "leave it out, or use the block model: points only react to ditches and embankments"
             )

@@ -23,6 +23,7 @@ from rigdda.geometry import polygon_properties
 from rigdda.measurement import AT_REST
 from rigdda.model.site import Site
 from rigdda.releases import MOST_PER_THREAD, SENT, Batch, as_site, divided
+from rigdda.rounding import chainage
 
 PASSAGE = np.dtype(
     [
@@ -158,7 +159,10 @@ def check_stations(site: Site, stations: Sequence[float]) -> NDArray[np.float64]
     found = set()
     for x in check.sequence("stations", stations, (int, float), "a chainage"):
         if not low < x < high:
-            hint = f"give a chainage within the profile, between {low:g} and {high:g} m"
+            hint = (
+                f"give a chainage within the profile, between {chainage(low)} and "
+                f"{chainage(high)} m"
+            )
             raise BadInput("station", x, hint)
         found.add(float(x))
     return np.array(sorted(found), dtype=np.float64)

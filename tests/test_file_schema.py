@@ -101,6 +101,7 @@ def test_layouts_of_every_kind_pass(tmp_path):
         ("block = 0.7", "block = 1.7", "meshes.face.factors.block", "at most 1"),
         ("[road]", "[prices.fence]\n750 = 300.0\n\n[road]", "prices.fence", "1000"),
         ("[road]", "[prices.upkeep]\nwall = 2.0\n\n[road]", "prices.upkeep.wall", "at most 0.5"),
+        ("[road]", "[prices.ditch]\n\n[road]", "prices.ditch", "leave the table out"),
         ("duration = 20.0", 'damping_when = "never"', "motion.damping_when", "always, contact"),
         ("friction_deg = 28.0", "damping = 0.4", "surfaces.soil.damping", "give `rolling`"),
         ("friction_deg = 28.0", "rolling = 1.5", "surfaces.soil.rolling", "at most 1"),
@@ -135,6 +136,8 @@ def test_malformed_sites_are_refused_by_both(old, new, field, mend, tmp_path):
         ({"x": 1.0, "height": 1.0, "depth": 1.0}, "barriers[0].depth"),
         ({"kind": "fence", "x": 1.0, "height": 2.0, "energy_class": 7}, "barriers[0].energy_class"),
         ({"kind": "ditch", "x": 1.0, "depth": 1.0, "width": 0.0}, "barriers[0].width"),
+        ({"kind": "gravity_wall", "x": 1, "height": 1, "density": 2.4}, "barriers[0].density"),
+        ({"kind": "embankment", "x": 1, "height": 1, "density": 1.9}, "barriers[0].density"),
     ],
 )
 def test_malformed_layouts_are_refused_by_both(table, field, tmp_path):

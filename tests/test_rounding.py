@@ -16,7 +16,7 @@ from rigdda.app.reports.tables import bounded, risk_table
 from rigdda.app.reports.wording import at_most, euros, figure, percent, small, span, tenth
 from rigdda.envs.cost import Risk
 from rigdda.envs.intervals import Mean, estimate
-from rigdda.rounding import between, rounded
+from rigdda.rounding import between, chainage, rounded
 
 FORMS = (".0f", ",.0f", ".1f", ".3f", ".2g", ".3g", ".4g", ".10g")
 finite = st.floats(-1e12, 1e12, allow_nan=False).filter(lambda x: x == 0.0 or abs(x) > 1e-12)
@@ -92,3 +92,14 @@ def test_the_terminal_and_the_report_round_alike() -> None:
 def test_what_is_no_number_stays() -> None:
     assert rounded(math.inf, ".3g", "up") == "inf" and rounded(math.nan, ".3g", "down") == "nan"
     assert figure(math.nan, "up") == "?"
+
+
+def test_chainages_of_a_grid_keep_two_decimals() -> None:
+    texts = {
+        30.4: "30.4",
+        9999.25: "9999.25",
+        2_600_030.1: "2600030.1",
+        2_600_030.456: "2600030.46",
+    }
+    assert {value: chainage(value) for value in texts} == texts
+    assert (chainage(2_600_030.0), chainage(-12_345.678)) == ("2600030", "-12345.68")

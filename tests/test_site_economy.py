@@ -123,8 +123,10 @@ def test_mesh_costs_its_area_and_makes_events_rarer():
     assert FLAT.rate("block") == pytest.approx(0.006)
     assert FLAT.rate("block", mesh) == pytest.approx(0.2 * 0.006)
     assert FLAT.rate("group", mesh) == pytest.approx(0.7 * 0.001)
-    with pytest.raises(BadInput, match="use each option at most once"):
-        FLAT.rate("block", mesh * 2)
+    again = r"barriers\[1\]\.option = 'face': use each mesh option at most once: barriers\[0\] has"
+    for use in (FLAT.capital, FLAT.annual, FLAT.realise, lambda two: FLAT.rate("block", two)):
+        with pytest.raises(BadInput, match=again):
+            use(mesh * 2)
 
 
 def test_a_fence_is_priced_by_its_class():

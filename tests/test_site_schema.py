@@ -14,6 +14,7 @@ from rigdda import (
     Ditch,
     DoubtfulInput,
     Event,
+    Forest,
     Mesh,
     Site,
     Source,
@@ -23,7 +24,7 @@ from rigdda import (
 )
 from rigdda.ground.surface import Interface
 from rigdda.model import loose_blocks
-from rigdda.model.site_tables import Motion, Slope, Stretch
+from rigdda.model.site_tables import Motion, Road, Slope, Stretch
 
 QUICK = Site.load("quick")
 VERGE = Site.load("verge")
@@ -86,6 +87,7 @@ def test_unknown_keys_are_refused_at_every_depth(old, new, tmp_path):
         ("embankment = 110.0", "interest = 3.0", "prices.interest", "at most 0.5"),
         ("embankment = 110.0", "fence = { 750 = 300.0 }", "prices.fence", "1000"),
         ("embankment = 110.0", "ditch = { sole = 5.0 }", "prices.ditch", "rock, soil"),
+        ("embankment = 110.0", "ditch = {}", "prices.ditch", "at least 1 of its keys, or leave"),
         ("[road]", "[lumped.sole]\nnormal = 0.3\n\n[road]", "lumped", "rock"),
         (
             "[road]",
@@ -362,7 +364,7 @@ dbh = 0.3
         ("dbh = 0.3", "dbh = 30", "forest[0].dbh", "at most 2.5 [m]"),
         ("dbh = 0.3", "dbh = 0.3\nconifers = 80", "forest[0].conifers", "at most 1"),
         ("dbh = 0.3", "dbh = 0.3\nspecies = 1", "forest[0].species", "there is no such key"),
-        ("end = 9.0", "end = 3.0", "forest: end", "let it end beyond 4, where it begins"),
+        ("end = 9.0", "end = 3.0", "forest[0].end", "let it end beyond 4, where it begins"),
         ("end = 9.0", "end = 900.0", "forest[0].end", "keep it on the slope: at least -15"),
         ("start = 4.0", "start = -40.0", "forest[0].start", "keep it on the slope: at least -15"),
     ],
@@ -372,3 +374,44 @@ def test_a_forest_that_cannot_be_is_refused(old, new, field, mend, tmp_path):
     error = refused(tmp_path, "verge", "[motion]", FOREST.replace(old, new, 1))
     assert error.field == field
     assert mend in str(error)
+
+
+def test_of_several_tables_the_wrong_one_is_told(tmp_path):
+    forest = FOREST.removesuffix("[motion]")
+    wrong = forest.replace("end = 9.0", "end = 3.0")
+    named = wrong.replace("stems", 'name = "wood"\nstems')
+    for second, field in ((wrong, "forest[1].end"), (named, "forest.wood.end")):
+        error = refused(tmp_path, "verge", "[motion]", f"{forest}\n{second}\n[motion]")
+        assert error.field == field
+    sources = "[[sources]]\nband = [1.0, 2.0]\n[[sources]]\nband = [1.0, 2.0]\nblock_area = 1.0\n"
+    error = refused(tmp_path, "verge", "[motion]", f"{sources}\n[motion]")
+    assert error.field == "sources[3].block_area"
+    with pytest.raises(BadInput, match=r"forest\.wood\.end = 3"):
+        Forest(4.0, 3.0, 400.0, 0.3, name="wood")
+
+
+def test_chainages_of_a_grid_are_told_with_their_decimals():
+    grid, slope = 2_600_000.25, VERGE.slope
+    points = tuple((x + grid, y) for x, y in slope.points)
+    bands = [replace(s, band=tuple(x + grid for x in s.band)) for s in VERGE.sources]
+    zone = replace(VERGE.barrier_zone, start=VERGE.barrier_zone.start + grid,
+                   end=VERGE.barrier_zone.end + grid)  # fmt: skip
+    road = Road(VERGE.road.start + grid, VERGE.road.end + grid)
+    moved = {"slope": Slope(points, slope.toe + grid), "sources": tuple(bands), "road": road}
+    site = replace(VERGE, **moved, barrier_zone=zone)
+    with pytest.raises(BadInput, match=r"at least 2599985\.25 and at most 2600061\.25"):
+        replace(site, forest=(Forest(4.0, 9.0, 400.0, 0.3),))
+    with pytest.raises(BadInput, match=r"at least 2599985\.25 and at most 2600061\.25"):
+        replace(site, road=Road(12.0, 18.0))
+
+
+def test_blocks_that_are_too_large_for_the_slope_are_told():
+    event = replace(VERGE.events[0], area=(400.0, 900.0))
+    with pytest.raises(BadInput, match="give smaller blocks: they reach") as caught:
+        replace(VERGE, events=(event, *VERGE.events[1:]))
+    assert caught.value.field == f"events.{event.name}.area"
+    assert caught.value.value == (400.0, 900.0)
+    measured = replace(VERGE.sources[0], edges=(29.0, 20.0, 10.0))
+    events = tuple(replace(e, area=None) if e.source == measured.name else e for e in VERGE.events)
+    with pytest.raises(BadInput, match=r"edges = .*: give smaller blocks: they reach 29 m"):
+        replace(VERGE, sources=(measured, *VERGE.sources[1:]), events=events)

@@ -343,7 +343,7 @@ def test_what_could_be_read_in_two_ways_is_refused(text, part):
     ],
 )
 def test_a_number_too_many_in_some_rows_is_refused(text, line, row):
-    with pytest.raises(BadInput, match="same number of cells.*semicolons") as caught:
+    with pytest.raises(BadInput, match=r"same number of cells.*semicolons") as caught:
         parse_table("survey.csv", text)
     assert caught.value.field == f"survey.csv line {line}"
     assert caught.value.value == row

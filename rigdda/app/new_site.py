@@ -39,6 +39,7 @@ from rigdda.model.soundness import LEAST_BEYOND
 from rigdda.model.source import Source
 from rigdda.model.survey import Profile, profile_of, read_survey
 from rigdda.model.traffic import Traffic
+from rigdda.rounding import chainage
 
 Floats = NDArray[np.float64]
 Span = tuple[float, float]
@@ -479,7 +480,10 @@ class _Draft:
         free += [mass.span[1] + ZONE_CLEARANCE for mass in self.masses]
         low = max(self.toe - UPHILL, *free, float(self.x[0]))
         if not low < high:
-            hint = f"give the zone for barriers: loose rock reaches x = {low:g}, close to the road"
+            hint = (
+                f"give the zone for barriers: loose rock reaches x = {chainage(low)}, close to "
+                "the road"
+            )
             raise BadInput("--zone", None, hint)
         return round(low, 3), round(high, 3)
 
@@ -685,8 +689,11 @@ def _check_apart(given: Iterable[tuple[Span, str]], origin: Origin) -> None:
     for (one, name), (two, other) in pairwise(sorted(given)):
         if two[0] < one[1]:
             start = origin.chainage_of(two[0])
-            hint = f"let it begin where {name} ends, at chainage {origin.chainage_of(one[1]):g}"
-            raise BadInput("--ground", f"{other} from chainage {start:g}", hint)
+            hint = (
+                f"let it begin where {name} ends, at chainage "
+                f"{chainage(origin.chainage_of(one[1]))}"
+            )
+            raise BadInput("--ground", f"{other} from chainage {chainage(start)}", hint)
 
 
 def _head(name: str, file: Path, profile: Profile) -> list[str]:

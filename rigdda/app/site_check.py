@@ -20,6 +20,7 @@ from rigdda.geometry import polygon_properties
 from rigdda.model.forest import most_energy
 from rigdda.model.joints import spaced_area
 from rigdda.releases import Batch
+from rigdda.rounding import chainage
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -56,9 +57,9 @@ def facts(site: Site) -> list[str]:
     total = sum(event.rate for event in site.events)
     design = [event.name for event in site.events if event.design]
     return [
-        f"{site.name}: a slope {tall:.1f} m high above a road "
-        f"{road.end - road.start:.1f} m wide at x = {road.start:g} to {road.end:g} m; "
-        f"{len(x)} points from x = {x[0]:g} to {x[-1]:g} m, {x[-1] - road.end:.1f} m beyond the "
+        f"{site.name}: a slope {tall:.1f} m high above a road {road.end - road.start:.1f} m wide "
+        f"at x = {chainage(road.start)} to {chainage(road.end)} m; {len(x)} points from x = "
+        f"{chainage(x[0])} to {chainage(x[-1])} m, {x[-1] - road.end:.1f} m beyond the "
         "road",
         *_origin(site),
         "ground: " + "; ".join(_grounds(site)),
@@ -79,9 +80,9 @@ def _forests(site: Site) -> Iterator[str]:
         energy = most_energy(np.array([one.dbh]), np.array([one.conifers >= 0.5]))[0]
         often = one.struck(size)
         yield (
-            f"forest at x = {one.start:g} to {one.end:g} m: {one.stems:g} stems a hectare of "
-            f"{one.dbh:g} m, a basal area of {one.basal_area:.3g} m2 a hectare; a block {size:.2g} "
-            "m wide strikes one "
+            f"forest at x = {chainage(one.start)} to {chainage(one.end)} m: {one.stems:g} stems a "
+            f"hectare of {one.dbh:g} m, a basal area of {one.basal_area:.3g} m2 a hectare; a block "
+            f"{size:.2g} m wide strikes one "
             + (f"in every {1.0 / often:.3g} m" if often > 0.0 else "never")
             + f", which takes at most {1e-3 * energy:.3g} kJ if it is of the mean diameter"
         )
@@ -95,8 +96,8 @@ def _standing(site: Site) -> Iterator[str]:
             may = f"it may be removed or replaced for {one.removal or 0.0:g} EUR per metre"
         upkeep = site.prices.upkeep_of(barrier.kind, barrier.upkeep) * site.values(())[barrier]
         yield (
-            f"existing {barrier.label} at x = {barrier.x:g} m{surveyed(site, barrier.x)}: {may}; "
-            f"upkeep {upkeep:.3g} EUR per metre and year"
+            f"existing {barrier.label} at x = {chainage(barrier.x)} m{surveyed(site, barrier.x)}: "
+            f"{may}; upkeep {upkeep:.3g} EUR per metre and year"
         )
     if (traffic := site.traffic) is not None:
         value = traffic.fatality_value
@@ -144,7 +145,7 @@ def _grounds(site: Site) -> list[str]:
             start, before, _ = found.pop()
             end = max(end, before)
         found.append((start, end, name))
-    return [f"{called(site, name)} x = {a:g} to {b:g} m" for a, b, name in found]
+    return [f"{called(site, name)} x = {chainage(a)} to {chainage(b)} m" for a, b, name in found]
 
 
 def called(site: Site, surface: str) -> str:
@@ -170,7 +171,8 @@ def _source(source: Source) -> str:
     """Return what a source is and what blocks it makes."""
     if source.band is not None:
         return (
-            f"source {source.name}: loose blocks at x = {source.band[0]:g} to {source.band[1]:g} m"
+            f"source {source.name}: loose blocks at x = {chainage(source.band[0])} to "
+            f"{chainage(source.band[1])} m"
         )
     areas = [_areas(source, seed) for seed in range(CUTS if source.polygon else 1)]
     counts, every = [len(found) for found in areas], np.concatenate(areas)

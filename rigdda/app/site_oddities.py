@@ -23,6 +23,7 @@ from rigdda.model.existing import Existing
 from rigdda.model.joints import spaced_area
 from rigdda.model.soundness import LEAST_BEYOND
 from rigdda.model.survey import spike_words, spikes
+from rigdda.rounding import chainage
 
 Written = Mapping[str, Mapping[str, Any]]
 """Tables of events as they are written, by the name of the event."""
@@ -184,14 +185,14 @@ def _odd_profile(site: Site) -> Iterator[str]:
             "not in millimetres or feet?"
         )
     for k, height in spikes(np.column_stack([x, y])):
-        yield f"slope.points[{k}] = [{x[k]:g}, {y[k]:g}]: {spike_words(height)}"
+        yield f"slope.points[{k}] = [{chainage(x[k])}, {y[k]:g}]: {spike_words(height)}"
     if wide > WIDE or wide < NARROW:
         yield f"road: it is {wide:g} m wide; are chainages in metres, not in feet or kilometres?"
     above = site.profile.height(toe) - foot
     if tall > 0.0 and above > 0.5 * tall:
         yield (
-            f"slope.toe = {toe:g}: it is {above:.1f} m above the road, in the upper half of the "
-            "slope; give the chainage of its foot, not of its crest"
+            f"slope.toe = {chainage(toe)}: it is {above:.1f} m above the road, in the upper half "
+            "of the slope; give the chainage of its foot, not of its crest"
         )
     beyond = float(x[-1]) - road.end
     if beyond < SHORT:
@@ -257,9 +258,9 @@ def _odd_zone(site: Site) -> Iterator[str]:
     room, needed = site.road.start - rooms[0][0], FENCE_CLASSES[LEAST_FENCE_CLASS].elongation
     if room < needed:
         yield (
-            f"barrier_zone.start = {zone.start:g}: a fence of {LEAST_FENCE_CLASS} kJ gives way by "
-            f"{needed:g} m, and there are {room:.1f} m up to the road; begin the zone farther "
-            "uphill"
+            f"barrier_zone.start = {chainage(zone.start)}: a fence of {LEAST_FENCE_CLASS} kJ gives "
+            f"way by {needed:g} m, and there are {room:.1f} m up to the road; begin the zone "
+            "farther uphill"
         )
     size = max(_size(site, event) for event in site.events)
     for name, factor in (("max_height", 1.5), ("max_depth", 1.0), ("max_width", 1.5)):
@@ -293,9 +294,12 @@ def _odd_forest(site: Site) -> Iterator[str]:
                 "the ground; higher up it is less"
             )
         if one.end <= first:
-            yield f"{where}.end = {one.end:g}: all rock starts farther downhill, at x = {first:g} m"
+            yield (
+                f"{where}.end = {chainage(one.end)}: all rock starts farther downhill, at x = "
+                f"{chainage(first)} m"
+            )
         if one.start < site.road.end and one.end > site.road.start:
-            road = f"x = {site.road.start:g} to {site.road.end:g} m"
+            road = f"x = {chainage(site.road.start)} to {chainage(site.road.end)} m"
             yield f"{where}: it reaches onto the road, {road}"
 
 
@@ -315,7 +319,7 @@ def _odd_existing(site: Site) -> Iterator[str]:
         end = barrier.end + barrier.deflection
         if end > site.road.start:
             yield (
-                f"existing[{i}].x = {barrier.x:g}: the {barrier.words} gives way by up to "
+                f"existing[{i}].x = {chainage(barrier.x)}: the {barrier.words} gives way by up to "
                 f"{barrier.deflection:g} m, {end - site.road.start:.1f} m onto the road; a new one "
                 "would not be allowed there"
             )
@@ -439,7 +443,10 @@ def _odd_source(site: Site, source: Source) -> Iterator[str]:
         start, end = source.band
         yield from _odd_band(site, source)
         if start > site.slope.toe:
-            yield f"{source.words}.band = [{start:g}, {end:g}]: it lies below slope.toe"
+            yield (
+                f"{source.words}.band = [{chainage(start)}, {chainage(end)}]: it lies below "
+                "slope.toe"
+            )
         return
     for words, high in _hanging(site, source):
         yield f"{words}: it hangs {high:.2f} m above the ground; let it rest there"
@@ -475,11 +482,12 @@ def _odd_band(site: Site, source: Source) -> Iterator[str]:
             rough.append(friction)
     share = sum(high - low for low, high in flat) / (end - start)
     if share >= LEAST_SHARE:
-        parts = " and ".join(f"{low:g} to {high:g}" for low, high in flat)
+        parts = " and ".join(f"{chainage(low)} to {chainage(high)}" for low, high in flat)
         yield (
-            f"{source.words}.band = [{start:g}, {end:g}]: at x = {parts} m, {100.0 * share:.0f} % "
-            f"of it, the ground is {_angles(steep)} deg steep, less than its friction angle of "
-            f"{_angles(rough)} deg, so that blocks may stay where they are; leave this part out"
+            f"{source.words}.band = [{chainage(start)}, {chainage(end)}]: at x = {parts} m, "
+            f"{100.0 * share:.0f} % of it, the ground is {_angles(steep)} deg steep, less than its "
+            f"friction angle of {_angles(rough)} deg, so that blocks may stay where they are; "
+            "leave this part out"
         )
 
 

@@ -108,7 +108,7 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
         """
         assert outline is not None
         prices = site.prices.ditch
-        highest_price = max(prices.values(), default=0.0)
+        highest_price = max(prices.values())
         count = len(outline) // 2 + 1
         x, new = outline[:count].T
         old = np.array([new[0], *outline[: count - 1 : -1, 1], new[-1]])

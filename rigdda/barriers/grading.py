@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rigdda.errors import BadInput
 from rigdda.ground.terrain import Terrain
+from rigdda.rounding import chainage
 
 Floats = NDArray[np.float64]
 
@@ -85,7 +86,8 @@ def _segments(field: str, ground: Terrain, start: float, end: float) -> tuple[in
     """Return the indices of the first and last segment between two chainages."""
     x = ground.points[:, 0]
     if start < x.min() or end > x.max():
-        raise BadInput(field, start, f"stay on the terrain, {x.min():g} to {x.max():g} m")
+        told = f"stay on the terrain, {chainage(x.min())} to {chainage(x.max())} m"
+        raise BadInput(field, start, told)
     low, high = np.minimum(x[:-1], x[1:]), np.maximum(x[:-1], x[1:])
     over = np.flatnonzero((low < end) & (high > start))
     if (np.diff(x)[over] <= 0.0).any() or (np.diff(over) != 1).any():

@@ -289,7 +289,7 @@ def _worthy(problem: DesignProblem) -> Values:
     bought = {
         "fence": per_m2 * CHECKED.height + prices.fence_base,
         "embankment": 10.0 * prices.embankment,
-        "ditch": 10.0 * min(prices.ditch.values(), default=0.0) + prices.ditch_base,
+        "ditch": 10.0 * min(prices.ditch.values()) + prices.ditch_base,
     }
     return {
         "closure": [math.log10(1.0 + site.consequences.closure)],

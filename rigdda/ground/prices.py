@@ -77,6 +77,7 @@ class Prices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             "Price of excavation by the surface of the ground. Other surfaces cost as much as the "
             "most expensive one in the table.",
             "EUR/m3",
+            least=1,
         ),
     ] = msgspec.field(default_factory=lambda: dict(DITCHES))
     ditch_base: Annotated[Price, about("Additional price of a ditch.", "EUR/m")] = 20.0

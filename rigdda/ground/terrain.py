@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda import check
 from rigdda.errors import BadInput
+from rigdda.rounding import chainage
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +104,8 @@ class Terrain:
         low, high = np.minimum(chain[:-1], chain[1:]), np.maximum(chain[:-1], chain[1:])
         over = np.flatnonzero((low <= x) & (x <= high))
         if not over.size:
-            raise BadInput("x", x, f"stay on the terrain, {low.min():g} to {high.max():g} m")
+            told = f"stay on the terrain, {chainage(low.min())} to {chainage(high.max())} m"
+            raise BadInput("x", x, told)
         ends = zip(self.points[over].tolist(), self.points[over + 1].tolist(), strict=True)
         return max(
             max(ay, by) if ax == bx else ay + (x - ax) / (bx - ax) * (by - ay)

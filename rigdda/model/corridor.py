@@ -316,7 +316,8 @@ def checked_budgets(field: str, budgets: Any) -> tuple[float, ...]:
     given = budgets if isinstance(budgets, list | tuple) else [budgets]
     if not given:
         raise BadInput(field, budgets, "give at least one budget in EUR")
-    return tuple(sorted({check.number(field, value, 0.0, LARGEST_BUDGET, unit="EUR") for value in given}))
+    found = {check.number(field, value, 0.0, LARGEST_BUDGET, unit="EUR") for value in given}
+    return tuple(sorted(found))
 
 
 def _corridor(data: dict[str, Any], folder: Path) -> Corridor:

@@ -30,6 +30,7 @@ from rigdda.barriers.grading import FLATTEST_SLOPE, LEAST_SLOPE
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
 from rigdda.ground.terrain import Terrain
+from rigdda.rounding import chainage
 
 EXISTING_KINDS = ("fence", "ditch", "embankment", "gravity_wall", "wall")
 """Kinds that may stand already. Mesh is not among them, because the rates of events are those with
@@ -181,11 +182,13 @@ def check_existing(
             raise BadInput(f"{where}.removal", one.removal, hint)
         barrier = _barrier(one, where)
         if not low <= barrier.x <= high:
-            hint = f"put it on the slope, at least {low:g} and at most {high:g}"
+            hint = f"put it on the slope, at least {chainage(low)} and at most {chainage(high)}"
             raise BadInput(f"{where}.x", barrier.x, hint)
         if barrier.end > road:
-            hint = f"put all of it, up to {barrier.end:g}, uphill of the road, which begins at"
-            raise BadInput(f"{where}.x", barrier.x, f"{hint} {road:g}")
+            hint = (
+                f"put all of it, up to {chainage(barrier.end)}, uphill of the road, which begins at"
+            )
+            raise BadInput(f"{where}.x", barrier.x, f"{hint} {chainage(road)}")
         try:
             if isinstance(barrier, Earthwork):
                 earthworks(ground, (barrier,), soil)
@@ -194,7 +197,10 @@ def check_existing(
             raise BadInput(f"{where}: {bad.field}", bad.value, bad.hint) from None
         for other, span in found:
             if works[0] < span[1] and span[0] < works[1]:
-                hint = f"it overlaps the existing {other.words} at {other.x:g}: correct one of them"
+                hint = (
+                    f"it overlaps the existing {other.words} at {chainage(other.x)}: correct one "
+                    "of them"
+                )
                 raise BadInput(f"{where}.x", barrier.x, hint)
         found.append((barrier, works))
     return tuple(barrier for barrier, _ in found)
@@ -231,7 +237,7 @@ def _removed(existing: tuple[Existing, ...], at: int, removal: Barrier) -> list[
         i for i, e in enumerate(existing) if e.removable and abs(e.x - removal.x) <= SAME_PLACE
     ]
     if not found:
-        known = ", ".join(f"{one.x:g}" for one in existing if one.removable)
+        known = ", ".join(chainage(one.x) for one in existing if one.removable)
         hint = f"give {known}" if known else "leave it out: the site has no removable barrier"
         raise BadInput(f"barriers[{at}].x", removal.x, hint)
     return found
@@ -270,5 +276,8 @@ def _check_clear(barrier: Built, ground: Terrain, layout: Layout) -> None:
         if isinstance(other, Built):
             start, end = other.works(ground)
             if start < high and low < end:
-                hint = f"keep clear of the existing {barrier.words} at {low:g} to {high:g}"
+                hint = (
+                    f"keep clear of the existing {barrier.words} at {chainage(low)} to "
+                    f"{chainage(high)}"
+                )
                 raise BadInput(f"barriers[{i}].x", other.x, hint)

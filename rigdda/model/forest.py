@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import msgspec
 import numpy as np
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from rigdda import fields
 from rigdda.errors import BadInput
 from rigdda.fields import about, documented
+from rigdda.rounding import chainage
 
 Floats = NDArray[np.float64]
 
@@ -90,12 +91,13 @@ class Forest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         ),
     ] = 5.0
     name: Annotated[str, about("Name of the forest, unique among those of the site.")] = "forest"
+    array: ClassVar[str] = "forest"
 
     def __post_init__(self) -> None:
-        fields.check(self, "forest: ")
+        fields.check(self, f"forest.{self.name}.")
         if self.end <= self.start:
-            hint = f"let it end beyond {self.start:g}, where it begins"
-            raise BadInput("forest: end", self.end, hint)
+            hint = f"let it end beyond {chainage(self.start)}, where it begins"
+            raise BadInput(f"forest.{self.name}.end", self.end, hint)
 
     @property
     def basal_area(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 import numpy as np
@@ -26,6 +26,7 @@ from rigdda.model.partial_factors import PartialFactors
 from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT, check_damping
 from rigdda.model.source import Point, Source
 from rigdda.model.traffic import Traffic
+from rigdda.rounding import chainage
 
 
 @documented
@@ -81,10 +82,15 @@ class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             where = f"slope.surfaces[{i}]"
             if stretch.start < last:
                 before = self.surfaces[i - 1].surface
-                hint = f"let {stretch.surface} begin at {last:g} or beyond, where {before} ends"
+                hint = (
+                    f"let {stretch.surface} begin at {chainage(last)} or beyond, where {before} "
+                    "ends"
+                )
                 raise BadInput(f"{where}.start", stretch.start, hint)
             if stretch.end <= stretch.start:
-                hint = f"let {stretch.surface} end beyond {stretch.start:g}, where it begins"
+                hint = (
+                    f"let {stretch.surface} end beyond {chainage(stretch.start)}, where it begins"
+                )
                 raise BadInput(f"{where}.end", stretch.end, hint)
             last = stretch.end
 
@@ -272,6 +278,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             choices=(RELEASE, ARRIVAL),
         ),
     ] = RELEASE
+    array: ClassVar[str] = "events"
 
     def __post_init__(self) -> None:
         fields.check(self, f"{self.words}.")
@@ -382,7 +389,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def words(self) -> str:
         """Path of the event in error messages."""
-        return f"events.{self.name}"
+        return f"{self.array}.{self.name}"
 
     def check_source(self, source: Source) -> None:
         """Check that the event specifies exactly what its source requires.

@@ -19,6 +19,7 @@ from rigdda.model.settings import Settings
 from rigdda.model.site_tables import SiteTables
 from rigdda.model.source import ALLOWED_OVERLAP, Point, Source
 from rigdda.model.survey import GREATEST_HEIGHT, GREATEST_LENGTH
+from rigdda.rounding import chainage
 
 LEAST_BEYOND = 30.0
 """Minimum length of the ground beyond the road [m], so that blocks that cross the road count as
@@ -127,8 +128,8 @@ def _check_slope(site: SiteTables) -> None:
     outside = np.flatnonzero((x < low) | (x > high))
     if outside.size:
         hint = (
-            f"give an x between {low:g} and {high:g}, those of the first and the last point: the "
-            "points go downhill from the least x to the greatest x"
+            f"give an x between {chainage(low)} and {chainage(high)}, those of the first and the "
+            "last point: the points go downhill from the least x to the greatest x"
         )
         raise BadInput(f"slope.points[{outside[0]}]", points[outside[0]].tolist(), hint)
     _check_chain(points)
@@ -145,13 +146,17 @@ def _check_slope(site: SiteTables) -> None:
         for end in ("start", "end"):
             at = getattr(stretch, end)
             if not low <= at <= high:
-                hint = f"keep {stretch.surface} on the slope: at least {low:g} and at most {high:g}"
+                hint = (
+                    f"keep {stretch.surface} on the slope: at least {chainage(low)} and at most "
+                    f"{chainage(high)}"
+                )
                 raise BadInput(f"slope.surfaces[{i}].{end}", at, hint)
     if high < road.end + LEAST_BEYOND:
         raise BadInput(
             f"slope.points[{len(points) - 1}]",
             points[-1].tolist(),
-            f"extend the ground to at least x = {road.end + LEAST_BEYOND:g}, {LEAST_BEYOND:g} m "
+            f"extend the ground to at least x = {chainage(road.end + LEAST_BEYOND)}, "
+            f"{LEAST_BEYOND:g} m "
             "beyond the road, for rock that crosses it",
         )
 
@@ -194,10 +199,28 @@ def _check_source(site: SiteTables, source: Source) -> None:
         low, high = source.band
         if low - room < chain[0, 0] or high + room >= site.road.start:
             first, last = chain[0, 0] + room, site.road.start - room
-            hint = f"keep it between {first:g} and {last:g}, so that its blocks clear the road"
+            if first >= last:
+                raise _too_large(site, source, room)
+            hint = (
+                f"keep it between {chainage(first)} and {chainage(last)}, so that its blocks "
+                "clear the road"
+            )
             raise BadInput(f"{source.words}.band", source.band, hint)
     for where, piece in source.pieces():
         _check_piece(site, where, piece, ground)
+
+
+def _too_large(site: SiteTables, source: Source, room: float) -> BadInput:
+    """Return the error of blocks that reach `room` [m] beyond a band, too far for the slope."""
+    crest, road = site.slope.points[0][0], site.road.start
+    hint = (
+        f"give smaller blocks: they reach {room:.3g} m beyond their band on either side, and there "
+        f"are {road - crest:.3g} m from the crest to the road"
+    )
+    if source.edges is not None:
+        return BadInput(f"{source.words}.edges", source.edges, hint)
+    event = max(site.events_of(source), key=lambda event: loose_blocks.reach(source, event))
+    return BadInput(f"{event.words}.area", event.area, hint)
 
 
 def _check_onward(site: SiteTables, source: Source) -> None:
@@ -207,9 +230,9 @@ def _check_onward(site: SiteTables, source: Source) -> None:
     if back.size:
         k = int(back[0])
         hint = (
-            f"it lies uphill of slope.points[{k - 1}] at x = {x[k - 1]:g}: correct one of the two, "
-            f"or, if the ground overhangs there, give {source.words} a polygon or blocks instead "
-            "of a band"
+            f"it lies uphill of slope.points[{k - 1}] at x = {chainage(x[k - 1])}: correct one of "
+            f"the two, or, if the ground overhangs there, give {source.words} a polygon or blocks "
+            "instead of a band"
         )
         raise BadInput(f"slope.points[{k}]", list(site.slope.points[k]), hint)
 
@@ -221,9 +244,9 @@ def _check_piece(
     left, _, right, _ = rock.bounds
     crest = site.slope.points[0][0]
     if left < crest:
-        raise BadInput(where, piece, f"put it beyond the crest at {crest:g}")
+        raise BadInput(where, piece, f"put it beyond the crest at {chainage(crest)}")
     if right >= site.road.start:
-        raise BadInput(where, piece, f"put it uphill of the road at {site.road.start:g}")
+        raise BadInput(where, piece, f"put it uphill of the road at {chainage(site.road.start)}")
     sunk = overlap(rock, ground)
     if sunk > ALLOWED_OVERLAP * rock.length:
         corners = shapely.points(piece)
@@ -243,7 +266,9 @@ def _check_forest(site: SiteTables) -> None:
         for name in ("start", "end"):
             at = getattr(forest, name)
             if not low <= at <= high:
-                hint = f"keep it on the slope: at least {low:g} and at most {high:g}"
+                hint = (
+                    f"keep it on the slope: at least {chainage(low)} and at most {chainage(high)}"
+                )
                 raise BadInput(f"forest[{i}].{name}", at, hint)
 
 
@@ -260,7 +285,7 @@ def _check_zone(site: SiteTables) -> None:
         for where, piece in source.pieces():
             taken = shapely.intersection(room, shapely.Polygon(piece))
             if taken.area > ALLOWED_OVERLAP * taken.length:
-                hint = f"put it beyond {taken.bounds[2]:g}: {where} lies in the zone"
+                hint = f"put it beyond {chainage(taken.bounds[2])}: {where} lies in the zone"
                 raise BadInput("barrier_zone.start", zone.start, hint)
 
 

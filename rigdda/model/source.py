@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 import numpy as np
@@ -167,6 +167,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             rising=True,
         ),
     ] = (0.2, 1.0)
+    array: ClassVar[str] = "sources"
 
     def __post_init__(self) -> None:
         where = self.words
@@ -230,7 +231,7 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def words(self) -> str:
         """Path of the source in error messages."""
-        return f"sources.{self.name}"
+        return f"{self.array}.{self.name}"
 
     def pieces(self) -> list[tuple[str, tuple[Point, ...]]]:
         """Return the path in error messages and the corners [m] of each polygon.

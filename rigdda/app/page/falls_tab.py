@@ -361,7 +361,7 @@ class FallsTab:
         if self._layout:
             parts += ["--layout", str(project.folder / "layout.toml")]
         parts += ["--event", self._event.value, "--releases", str(count)]
-        parts += ["--station", f"{self._station.value:g}", "--seed", "0"]
+        parts += ["--station", f"{self._station.value:.10g}", "--seed", "0"]
         words = f"<p style='margin:6px 0 0;color:{self.theme.quiet}'>The same figures:</p>"
         self._command.object = words + f"<code>{html.escape(shlex.join(parts))}</code>"
 

@@ -17,6 +17,7 @@ from rigdda import BadInput, Site
 from rigdda.app.page import edits
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model.site_tables import Stretch
+from rigdda.rounding import chainage
 
 STRETCHES = ("slope", "surfaces")
 """Path of the stretches in a site file."""
@@ -35,7 +36,7 @@ def laid(stretches: Sequence[Stretch], new: Stretch) -> list[Stretch]:
         If the new stretch does not end beyond its start.
     """
     if not new.end > new.start:
-        raise BadInput("end of the stretch", new.end, f"let it end beyond {new.start:g}")
+        raise BadInput("end of the stretch", new.end, f"let it end beyond {chainage(new.start)}")
     found = [new]
     for old in stretches:
         pieces = (old.start, min(old.end, new.start)), (max(old.start, new.end), old.end)

@@ -21,7 +21,7 @@ from rigdda.envs.intervals import Estimate, Mean, estimate, total
 from rigdda.envs.quantiles import BlockSample, Quantile, mean, quantiles
 from rigdda.files import atomic
 from rigdda.passages import AT_END, HAS_LEFT, IN_MOTION, STATES, Passages, ends
-from rigdda.rounding import rounded
+from rigdda.rounding import chainage, rounded
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -416,7 +416,7 @@ def undecided(passing: Passing) -> str:
     """Return in words how many blocks had not stopped at the end; empty if all had stopped."""
     state, words = passing.found.stops["state"], []
     if left := int((state == HAS_LEFT).sum()):
-        words.append(f"{left:,} left the profile at its end ({ends(passing.site)[1]:g} m)")
+        words.append(f"{left:,} left the profile at its end ({chainage(ends(passing.site)[1])} m)")
     if moving := int((state == IN_MOTION).sum()):
         words.append(f"{moving:,} still moved after {passing.site.motion.duration:g} s")
     if not words:

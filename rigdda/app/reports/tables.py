@@ -38,7 +38,7 @@ from rigdda.barriers import Earthwork, to_tables
 from rigdda.envs.cost import Risk
 from rigdda.envs.intervals import Estimate, Mean, estimate, mid_p, student_interval
 from rigdda.files import atomic
-from rigdda.rounding import between
+from rigdda.rounding import between, chainage
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -245,7 +245,7 @@ def sites(found: Iterable[Site]) -> Table:
             site.family or "-",
             f"{max(heights) - min(heights):.0f}",
             shorten(events, 160, placeholder=" ..."),
-            f"{zone.start:g} to {zone.end:g}",
+            f"{chainage(zone.start)} to {chainage(zone.end)}",
         )
     return table
 

@@ -23,6 +23,7 @@ from rigdda.app.reports.stations import QUANTITIES
 from rigdda.files import is_file
 from rigdda.files import read as read_text
 from rigdda.passages import check_stations
+from rigdda.rounding import chainage
 
 Floats = NDArray[np.float64]
 
@@ -72,7 +73,7 @@ class DataSet(NamedTuple):
         """Name in tables: that of the event and, except for run-outs, the quantity."""
         if self.quantity == OBSERVED_RUN_OUT:
             return self.event
-        at = "" if math.isnan(self.station) else f" at {self.station:g} m"
+        at = "" if math.isnan(self.station) else f" at {chainage(self.station)} m"
         return f"{self.event}, {self.quantity}{at}"
 
     @property
@@ -190,7 +191,10 @@ def _run_outs(rows: Sequence[Row], site: Site) -> list[DataSet]:
     for row in rows:
         value = _number(row, "run_out_m", site.slope.points[0][0], site.slope.points[-1][0])
         if value > site.road.end:
-            hint = f"move road.end beyond it: computed run-outs are cut off at {site.road.end:g} m"
+            hint = (
+                "move road.end beyond it: computed run-outs are cut off at "
+                f"{chainage(site.road.end)} m"
+            )
             raise BadInput(f"{row[0]} run_out_m", value, hint)
         found.setdefault(row[1]["event"], []).append(value)
     return [DataSet(OBSERVED_RUN_OUT, event, np.array(values)) for event, values in found.items()]
@@ -229,10 +233,13 @@ def _deposit(event: str, rows: list[tuple[Row, float, float, float]], amount: st
     ends = [rows[0][1]]
     for (where, _), start, end, _ in rows:
         if start != ends[-1]:
-            hint = f"let it begin at {ends[-1]:g}, where the interval before it ends; give 0 if "
+            hint = (
+                f"let it begin at {chainage(ends[-1])}, where the interval before it ends; give 0 "
+                "if "
+            )
             raise BadInput(f"{where} start_m", start, f"{hint}there is no rock")
         if end == start:
-            raise BadInput(f"{where} end_m", end, f"let the interval end beyond {start:g}")
+            raise BadInput(f"{where} end_m", end, f"let the interval end beyond {chainage(start)}")
         ends.append(end)
     amounts = np.array([row[3] for row in rows])
     if len(rows) < 2 or not amounts.any():

@@ -18,7 +18,7 @@ from rigdda.model.site_tables import BarrierZone, Motion, Road, Slope, Stretch
 FREE = Prices(
     fence_base=0.0,
     fence=dict.fromkeys(("100", "250", "500", "1000"), 0.0),
-    ditch={},
+    ditch={"rock": 0.0},
     ditch_base=0.0,
     embankment=0.0,
     concrete=0.0,

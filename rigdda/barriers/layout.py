@@ -177,8 +177,18 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
     if not file.is_file():
         raise BadInput("layout", str(path), "name an existing TOML or JSON file")
     form = "JSON" if file.suffix == ".json" else "TOML"
-    tables = fields.parse("layout", str(path), read("layout", file), form)
-    layout = fields.read(_LayoutFile, tables).barriers
+    return parse_layout(read("layout", file), str(path), form)
+
+
+def parse_layout(text: str, name: str, form: str = "TOML") -> Layout:
+    """Return the layout in the text of a layout file, which is called `name` in error messages.
+
+    Raises
+    ------
+    BadInput
+        As `load_layout` does.
+    """
+    layout = fields.read(_LayoutFile, fields.parse("layout", name, text, form)).barriers
     return as_layout([from_table(f"barriers[{i}]", table) for i, table in enumerate(layout)])
 
 

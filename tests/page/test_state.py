@@ -159,6 +159,26 @@ def test_a_broken_file_is_told_and_the_page_may_keep_its_own(tmp_path):
     assert Site.load(tmp_path / "site.toml") == project.site
 
 
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ('[[barrier]]\nkind = "fence"\nx = 17.0\nheight = 3.0\n', "did you mean barriers"),
+        ("barriers = []\nnote = 1\n", "note"),
+        ("barriers = 3\n", "give a list"),
+        ("# a comment only\n", "barriers"),
+    ],
+)
+def test_a_layout_file_with_an_unknown_key_is_refused_and_kept(text, named, tmp_path):
+    sites.load("quick").save(tmp_path / "site.toml")
+    file = tmp_path / "layout.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(BadInput, match=named):
+        Project.open(tmp_path)
+    with pytest.raises(BadInput, match=named):
+        load_layout(file)
+    assert file.read_text(encoding="utf-8") == text
+
+
 def test_alternatives_are_layout_files_with_plain_names(tmp_path):
     project = _project(tmp_path)
     project.change_layout((Fence(30.0, 3.0, energy_class=1000),), "a fence")

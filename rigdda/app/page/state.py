@@ -17,10 +17,9 @@ from typing import NamedTuple
 import msgspec
 import tomli_w
 
-from rigdda import BadInput, Error, Layout, Site, fields, load_layout
+from rigdda import BadInput, Error, Layout, Site, load_layout
 from rigdda.app.page import edits
-from rigdda.barriers import from_table
-from rigdda.barriers.layout import to_tables
+from rigdda.barriers.layout import parse_layout, to_tables
 from rigdda.files import atomic, read
 from rigdda.model import site_names
 
@@ -340,7 +339,7 @@ class Project:
             site = known[2]
         else:
             site = Site.parse(one.site, self.where.site.name) if one.site else None
-        layout = parse_layout(one.layout)
+        layout = parse_layout(one.layout, LAYOUT) if one.layout.strip() else ()
         self._parsed = one.site, one.layout, site, layout
         return site, layout
 
@@ -406,22 +405,6 @@ class Project:
 def layout_text(layout: Layout) -> str:
     """Return the text of a layout file; empty for no barriers."""
     return tomli_w.dumps({"barriers": to_tables(layout)}) if layout else ""
-
-
-def parse_layout(text: str) -> Layout:
-    """Return the layout of the text of a layout file.
-
-    Raises
-    ------
-    BadInput
-        If it is not a layout.
-    """
-    if not text.strip():
-        return ()
-    tables = fields.parse("layout", LAYOUT, text).get("barriers", [])
-    if not isinstance(tables, list):
-        raise BadInput("barriers", tables, "give a list of tables, [[barriers]]")
-    return tuple(from_table(f"barriers[{i}]", table) for i, table in enumerate(tables))
 
 
 def _put(file: Path, text: str) -> None:

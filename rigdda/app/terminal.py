@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import sys
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from rigdda.agents.limits import JOB_RELEASES
+from rigdda.agents.limits import JOB_RELEASES, RELEASE_SEED
 
 if TYPE_CHECKING:
     from rigdda import Layout, Site
@@ -59,16 +60,22 @@ class _InRange(click.ParamType):
     def convert(
         self, value: Any, param: click.Parameter | None, context: click.Context | None
     ) -> Any:
-        """Return the number; an underscore between digits is a typing error, not a separator."""
+        """Return the number, which is finite.
+
+        An underscore between digits is a typing error, not a separator.
+        """
+        from rigdda import BadInput
+
+        name = param.opts[0] if param else "number"
         try:
             if isinstance(value, str) and "_" in value:
                 self.fail(value, param, context)
-            return super().convert(value, param, context)
+            found = super().convert(value, param, context)
         except click.BadParameter:
-            from rigdda import BadInput
-
-            name = param.opts[0] if param else "number"
             raise BadInput(name, value, f"give {self.what}{self._bounds()}") from None
+        if not math.isfinite(found):  # NaN is within the range of click
+            raise BadInput(name, value, f"give a finite number{self._bounds()}")
+        return found
 
     def _bounds(self) -> str:
         own: Any = self
@@ -110,7 +117,7 @@ def out_option(default: str) -> Callable[..., Any]:
     )
 
 
-def seed_option(words: str, most: int | None = None) -> Callable[..., Any]:
+def seed_option(words: str, most: int = RELEASE_SEED) -> Callable[..., Any]:
     """Return the option --seed with a help text; `most` is the largest seed that is accepted."""
     kind = WholeNumber(0, most)
     return click.option("--seed", type=kind, default=0, show_default=True, help=words)

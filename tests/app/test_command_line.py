@@ -9,12 +9,16 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
+import pyarrow.parquet as pq
 import pytest
 from processes import png_size, refused, rig, rows, run, run_process, run_told
 from rerun.chunk import RrdReader
 
 import rigdda
 from rigdda import Site
+from rigdda.agents.limits import RELEASE_SEED
+from rigdda.app import cli
+from rigdda.app.terminal import WholeNumber
 from rigdda.barriers import to_tables
 
 CHUTE = "chute.toml"
@@ -313,6 +317,25 @@ def test_a_quick_look_with_points(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
+def test_the_seed_of_every_command_has_a_limit(command: str) -> None:
+    for option in cli.cli.commands[command].params:
+        if option.name == "seed":
+            assert isinstance(option.type, WholeNumber)
+            assert option.type.max is not None and option.type.max < 2**64
+
+
+def test_the_largest_seed_is_in_the_tables(toml: Path, tmp_path: Path) -> None:
+    options = ("--releases", 2, "--seed", RELEASE_SEED, "--out", "o")
+    run("simulate", toml, *options, folder=tmp_path)
+    table = pq.read_table(tmp_path / "o/stops.parquet")
+    assert {*table["seed"].to_pylist()} == {RELEASE_SEED, RELEASE_SEED + 1}
+    assert [int(row["seed"]) for row in rows(tmp_path / "o/outcomes.csv")] == [
+        RELEASE_SEED,
+        RELEASE_SEED + 1,
+    ]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_explains_itself(command: str, tmp_path: Path) -> None:
     words = run(command, "--help", folder=tmp_path)
     assert words.startswith(f"Usage: rigdda {command}")
@@ -397,6 +420,12 @@ def test_a_bad_layout_file_is_one_line(
         (("design", "quick", "--budget", 10**9), ("--budget", "1000000000")),
         (("design", "quick", "--seed", 2**32), ("--seed", "4294967296", "4,294,967,295")),
         (("train", "--seed", 10**22), ("--seed",)),
+        (("simulate", "quick", "--seed", 2**63 - 1), ("--seed", f"{2**63 - 1 - 10**6:,}")),
+        (("study", "none.toml", "--seed", 2**63), ("--seed", f"{2**63 - 1 - 10**6:,}")),
+        (("check", "quick", "--seed", 2**63), ("--seed", f"{2**63 - 1 - 10**6:,}")),
+        (("validate", "--seed", 2**63), ("--seed", f"{2**63 - 1 - 10**6:,}")),
+        (("replay", "quick", "--seed", 2**64), ("--seed", f"{2**64 - 1:,}")),
+        (("fidelity", "quick", "--seed", 2**32), ("--seed", "4294967296", "4,294,967,295")),
         (("evaluate", "--seed", 2**32), ("--seed", "4294967296")),
         (("evaluate", "--sites", 10**5), ("sites", "100000", "at most")),
         (("validate", "--only", ""), ("--only", "''", "free-fall")),
@@ -479,6 +508,20 @@ def test_a_terminal_sees_progress(toml: Path, tmp_path: Path) -> None:
             "--precision = '2': give a number of at least 0.0 and at most 0.5",
         ),
         (("design", "quick", "--seed", "-1"), "--seed = '-1': give a whole number of at least 0"),
+        (
+            ("design", "quick", "--precision", "nan"),
+            "--precision = 'nan': give a finite number of at least 0.0 and at most 0.5",
+        ),
+        (
+            ("design", "quick", "--target", "NaN"),
+            "--target = 'NaN': give a finite number above 0.0 and at most 1.0",
+        ),
+        (
+            ("design", "quick", "--max-cost", "inf"),
+            "--max-cost = 'inf': give a finite number of at least 0.0",
+        ),
+        (("design", "quick", "--zone", "nan", "20"), "--zone = 'nan': give a finite number"),
+        (("simulate", "quick", "--station", "inf"), "--station = 'inf': give a finite number"),
         (
             ("train", "--model", "value", "--simulate", "3"),
             "--algorithm and --simulate are for --model policy",

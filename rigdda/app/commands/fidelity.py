@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rigdda.agents.limits import SEED
 from rigdda.app.terminal import (
     count_option,
     folder_for,
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("site")
 @count_option("--releases", 10, 2000, "Number of releases of each layout at each fidelity.")
-@seed_option("Seed of the releases.")
+@seed_option("Seed of the releases.", SEED)
 @out_option("fidelity-SITE")
 def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
     """Measure the bias and the speed-up of fidelity "fast".

@@ -6,13 +6,15 @@ import importlib.util
 
 import click
 
+from rigdda.app.terminal import WholeNumber
+
 INSTALL = "pip install 'rigdda[page]'"
 """How the extra is installed."""
 
 
 @click.command("open")
 @click.argument("target", required=False, metavar="[SITE | FILE | FOLDER]")
-@click.option("--port", type=click.IntRange(1, 65535), metavar="P",
+@click.option("--port", type=WholeNumber(1, 65535), metavar="P",
               help="Port of the page.  [default: a free one]")  # fmt: skip
 @click.option("--no-browser", is_flag=True, help="Only print the address of the page.")
 def open_page(target: str | None, port: int | None, no_browser: bool) -> None:

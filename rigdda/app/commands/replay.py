@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rigdda.agents.limits import SINGLE_SEED
 from rigdda.app.terminal import (
     folder_for,
     layout_option,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     metavar="NAME",
     help="Replay a release of this event.  [default: draw an event by its rate]",
 )
-@seed_option("Seed of the release.")
+@seed_option("Seed of the release.", SINGLE_SEED)
 @out_option("replay-SITE")
 def replay(target: str, layout: str | None, event: str | None, seed: int, out: Path | None) -> None:
     """Open a replay, or record a release of a site as one.

@@ -59,7 +59,7 @@ def vector(field: str, value: ArrayLike, size: int) -> Floats:
         if np.iscomplexobj(array):
             raise TypeError
         array = array.astype(np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise BadInput(field, value, f"give {size} numbers from -1 to 1") from None
     if array.shape != (size,):
         raise BadInput(f"shape of {field}", array.shape, f"give {size} numbers, shape ({size},)")

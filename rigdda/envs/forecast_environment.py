@@ -105,8 +105,20 @@ class Catalogue:
 
 
 def _from_file(path: str | os.PathLike[str] | None) -> ForecastTable:
-    """Return the table in a file, or the one that ships."""
-    return load() if path is None else load(os.fspath(path))
+    """Return the table in a file, or the one that ships.
+
+    Raises
+    ------
+    BadInput
+        If it is not a path of such a file.
+    """
+    if path is None:
+        return load()
+    name = os.fspath(path) if isinstance(path, str | os.PathLike) else path
+    if not isinstance(name, str):
+        hint = "give a ForecastTable or the path of its file, or leave it out"
+        raise BadInput("table", path, hint)
+    return load(name)
 
 
 class BarrierForecast(gymnasium.Env[Any, Any]):
@@ -187,7 +199,7 @@ class BarrierForecast(gymnasium.Env[Any, Any]):
         """Return the forecast for a layout and end the episode."""
         if not self._open or self._row is None:
             raise ResetNeeded("the episode has ended: call reset() before the next step")
-        if not self.action_space.contains(action):
+        if isinstance(action, bool) or not self.action_space.contains(action):
             hint = f"give a whole number from 0 to {len(self.catalogue.table.layouts) - 1}"
             raise BadInput("action", action, hint)
         self._open = False
@@ -313,10 +325,14 @@ class BarrierForecastVector(VectorEnv[Any, NDArray[np.int64], Any]):
         if self.mode is AutoresetMode.DISABLED and self._ended.any():
             ended = np.flatnonzero(self._ended).tolist()
             raise ResetNeeded(f"copies {ended} have ended: reset them with the option {MASK}")
-        given, most = np.asarray(actions), self.catalogue.actions.n - 1
+        most = self.catalogue.actions.n - 1
+        hint = f"give {self.num_envs} whole numbers from 0 to {most}, one per copy"
+        try:
+            given = np.asarray(actions)
+        except ValueError:  # lists of different lengths
+            raise BadInput("actions", actions, hint) from None
         whole = given.shape == (self.num_envs,) and np.issubdtype(given.dtype, np.integer)
         if not whole or given.min() < 0 or given.max() > most:
-            hint = f"give {self.num_envs} whole numbers from 0 to {most}, one per copy"
             raise BadInput("actions", actions, hint)
         return given.astype(np.int64)
 

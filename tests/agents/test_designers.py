@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -185,10 +186,11 @@ def test_the_best_so_far_never_rises(valley: Valley) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize(
-    "simulations, seed", [(1, 0), (2.5, 0), (10**9, 0), (8, -1), (8, 0.5), (8, 2**32)]
+    "simulations, seed",
+    [(1, 0), (2.5, 0), (10**9, 0), ("x", 0), (None, 0), (8, -1), (8, 0.5), (8, 2**32), (8, "x")],
 )
 def test_an_unsound_budget_or_seed_is_refused(
-    name: str, simulations: float, seed: float, valley: Valley
+    name: str, simulations: Any, seed: Any, valley: Valley
 ) -> None:
     with pytest.raises(BadInput, match="whole number"):
         getattr(rigdda.agents, name).design(valley, simulations, seed)

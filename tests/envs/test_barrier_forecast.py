@@ -220,7 +220,7 @@ def test_a_bad_keyword_is_named(table: ForecastTable, terms: dict, words: str) -
 def test_a_bad_action_or_option_is_named(table: ForecastTable) -> None:
     env = gymnasium.make(NAME, table=table).unwrapped
     env.reset(seed=0)
-    for action in (4, -1, 0.5, "a"):
+    for action in (4, -1, 0.5, "a", True, np.True_, [0], None):
         with pytest.raises(BadInput, match="from 0 to 3"):
             env.step(action)
     env.step(np.int64(1))
@@ -233,6 +233,15 @@ def test_a_bad_action_or_option_is_named(table: ForecastTable) -> None:
     for actions in ([0, 4], [0], [0.5, 1.0]):
         with pytest.raises(BadInput, match="2 whole numbers from 0 to 3"):
             batch.step(np.array(actions))
+    for loose in ([True, False], [[0, 1], [2]], None):
+        with pytest.raises(BadInput, match="2 whole numbers from 0 to 3"):
+            batch.step(loose)
+
+
+@pytest.mark.parametrize("given", [3, True, 3.5, b"forecasts.safetensors", [1], {}])
+def test_what_is_no_path_of_a_table_is_named(given: object) -> None:
+    with pytest.raises(BadInput, match="table = .*give a ForecastTable or the path"):
+        gymnasium.make(NAME, table=given)
 
 
 def test_a_table_survives_its_file(table: ForecastTable, tmp_path) -> None:

@@ -87,9 +87,9 @@ def design(
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     check.number("precision", precision, 0.0, 1.0)
-    if simulations < LEAST_FINAL_BUDGET:
-        return policy.design(problem, simulations, seed, progress, store)
     ledger = Ledger(problem, simulations, seed, progress, store)
+    if ledger.budget < LEAST_FINAL_BUDGET:
+        return policy.design(problem, simulations, seed, progress, store)
     menu, track = Menu(problem), Track(ledger)
     known = unsearched(problem, menu)
     surrogate = forecast_pool(ledger, menu, known)

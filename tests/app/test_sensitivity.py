@@ -26,6 +26,8 @@ from rigdda.app.uncertainty.sensitivity import run as analyse_site
 from rigdda.app.unfinished import PARTS
 from rigdda.envs.cost import judge
 from rigdda.ground.grounds import GROUNDS
+from rigdda.model import site_names
+from rigdda.model.site_tables import MOST_OFTEN
 
 ISHIGAMI = [Parameter(name, -np.pi, np.pi) for name in "abc"]
 ISHIGAMI_S1, ISHIGAMI_ST = (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437)  # a = 7, b = 0.1
@@ -140,6 +142,38 @@ def test_ranges_are_those_of_the_library() -> None:
     assert {p.path for p in plausible(site, ())["prices"]}.isdisjoint({"prices.level"})
 
 
+def test_default_ranges_end_where_the_site_is_no_longer_valid() -> None:
+    often = set_numbers(Site.load("quick"), ("events.block.rate",), (500.0,))
+    known = {one.path: one for one in choose((), often, ())}
+    assert known["events.block.rate"].low == pytest.approx(500.0 / 3.0)
+    assert known["events.block.rate"].high == pytest.approx(MOST_OFTEN, rel=1e-6)
+    for one in known.values():
+        for place in np.linspace(0.0, 1.0, 4):
+            set_numbers(often, one.paths, one.at(float(place)))
+    at_limit = set_numbers(often, ("events.block.rate",), (MOST_OFTEN,))
+    (rate,) = (one for one in choose(("rates",), at_limit, ()) if "block" in one.path)
+    assert (rate.low, rate.high) == pytest.approx((MOST_OFTEN / 3.0, MOST_OFTEN))
+
+
+def test_default_ranges_of_sizes_leave_the_blocks_of_a_band_their_room() -> None:
+    text = site_names.text("quick")
+    assert "[-10.0, 45.0]" in text
+    site = Site.parse(text.replace("[-10.0, 45.0]", "[-0.5, 45.0]"), "quick")
+    (size,) = (one for one in choose(("sizes",), site, ()) if one.path == "events.block.size")
+    assert size.low == 0.5 and 1.0 < size.high < 2.0
+    set_numbers(site, size.paths, (size.high,))
+    with pytest.raises(BadInput, match="band"):
+        set_numbers(site, size.paths, (1.001 * size.high,))
+
+
+def test_a_limit_that_makes_the_site_invalid_is_named_with_its_input() -> None:
+    site = Site.load("quick")
+    with pytest.raises(BadInput, match=r"^--parameters = 'events.block.size = 1000': .*band"):
+        choose(("events.block.size=1:1000",), site, ())
+    with pytest.raises(BadInput, match="LOW:HIGH"):
+        choose(("events.block.size=1:1_0",), site, ())
+
+
 def test_sizes_are_factors_on_volumes() -> None:
     quick = Site.load("quick")
     larger = set_numbers(quick, ("events.block.size", "sources.mass.size"), (8.0, 8.0))
@@ -219,7 +253,7 @@ def test_a_barrier_without_room_for_larger_blocks_is_told() -> None:
     site = Site.load("quick")
     fence = (Fence(8.95, 1.0, energy_class=100),)
     site.realise(fence)
-    with pytest.raises(BadInput, match="outside the loose rock"):
+    with pytest.raises(BadInput, match=r"outside the loose rock.*smaller values of .*size"):
         plan(site, fence, choose(("sizes",), site, fence), "morris", 4, 20, 0)
 
 

@@ -240,7 +240,7 @@ def test_a_bad_action_or_option_is_named(table: ForecastTable) -> None:
 
 @pytest.mark.parametrize("given", [3, True, 3.5, b"forecasts.safetensors", [1], {}])
 def test_what_is_no_path_of_a_table_is_named(given: object) -> None:
-    with pytest.raises(BadInput, match="table = .*give a ForecastTable or the path"):
+    with pytest.raises(BadInput, match=r"table = .*give a ForecastTable or the path"):
         gymnasium.make(NAME, table=given)
 
 

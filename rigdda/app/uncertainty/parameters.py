@@ -2,7 +2,7 @@
 
 A fit searches such numbers, and a sensitivity analysis samples them. The ranges of the ground are
 those of the library of grounds. The ranges of rates, block sizes, prices and consequences are
-factors on the values of the site, see `FACTORS`.
+factors on the values of the site, see `FACTORS`, as far as the site is valid with them.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def parse(text: str, known: Mapping[str, Parameter] | None = None) -> Parameter:
         return Parameter(path, *usual)
     found = re.fullmatch(r"([^:]+):([^:]+)", limits)
     try:
-        low, high = map(float, found.groups() if found else ())
+        low, high = map(check.parsed, found.groups() if found else ())
     except ValueError:
         raise BadInput("--parameters", text, f"write {path}=LOW:HIGH") from None
     if not -math.inf < low < high < math.inf:
@@ -171,7 +171,8 @@ def ground(site: Site) -> tuple[Parameter, ...]:
 def plausible(site: Site, layout: Layout) -> dict[str, tuple[Parameter, ...]]:
     """Return the uncertain numbers of a site with a layout by `GROUPS`.
 
-    Numbers without influence are left out: rates and costs of 0, and prices without barriers.
+    Numbers without influence are left out: rates and costs of 0, and prices without barriers. So
+    are numbers of which the site permits no other value.
     """
     sizes = [_factor(f"events.{e.name}.size", 1.0, "size") for e in site.events if e.area]
     sized = (s for s in site.sources if s.edges is not None or s.polygon)
@@ -189,14 +190,54 @@ def plausible(site: Site, layout: Layout) -> dict[str, tuple[Parameter, ...]]:
         money.append(Parameter("prices.interest", low, high))
         if site.prices.removal > 0.0:
             money.append(_factor("prices.removal", site.prices.removal, "cost"))
-    groups = (ground(site), tuple(sizes), tuple(rates), tuple(money))
-    return dict(zip(GROUPS, groups, strict=True))
+    factors = ([_permitted(site, one) for one in group] for group in (sizes, rates, money))
+    kept = (tuple(one for one in group if one.low < one.high) for group in factors)
+    return dict(zip(GROUPS, (ground(site), *kept), strict=True))
 
 
 def _factor(path: str, value: float, kind: str) -> Parameter:
     """Return a number that may be larger or smaller by a factor of `FACTORS`."""
     factor = FACTORS[kind]
     return Parameter(path, value / factor, value * factor, True)
+
+
+HALVINGS = 30
+"""Number of halvings of the interval in which the end of the permitted values of a number lies."""
+
+
+def _permitted(site: Site, one: Parameter) -> Parameter:
+    """Return a parameter with its range limited to values with which the site is valid.
+
+    Parameters on a logarithmic scale have the value of the site, which is valid, in the middle of
+    their range.
+    """
+    if not one.logarithmic:
+        return one
+    low, high = (_farthest(site, one, end) for end in (0.0, 1.0))
+    return one._replace(low=low, high=high)
+
+
+def _farthest(site: Site, one: Parameter, end: float) -> float:
+    """Return the value nearest to an end of a range (place 0 or 1) with which the site is valid."""
+    if _is_valid(site, one, end):
+        return one.low if end == 0.0 else one.high
+    sound, unsound = 0.5, end
+    for _ in range(HALVINGS):
+        middle = 0.5 * (sound + unsound)
+        if _is_valid(site, one, middle):
+            sound = middle
+        else:
+            unsound = middle
+    return one.at(sound)[0]
+
+
+def _is_valid(site: Site, one: Parameter, place: float) -> bool:
+    """Return whether a site is valid with the value of a parameter at a place of its range."""
+    try:
+        set_numbers(site, one.paths, one.at(place))
+    except BadInput:
+        return False
+    return True
 
 
 def choose(names: Sequence[str], site: Site, layout: Layout) -> tuple[Parameter, ...]:
@@ -229,7 +270,25 @@ def check_limits(site: Site, parameters: Sequence[Parameter]) -> None:
     """
     for parameter in parameters:
         for value in (parameter.low, parameter.high):
-            set_numbers(site, (parameter.path,), (value,))
+            _named(site, (parameter.path,), (value,), "choose a limit with which the site is valid")
+
+
+def _named(site: Site, paths: Sequence[str], values: Sequence[float], remedy: str) -> Site:
+    """Return a site with other values of some numbers, see `set_numbers`.
+
+    Raises
+    ------
+    BadInput
+        As `set_numbers` does; if the site is invalid, the message names the numbers and their
+        values, because the value in question may be one that they only affect.
+    """
+    try:
+        return set_numbers(site, paths, values)
+    except BadInput as bad:
+        if bad.field == "--parameters":
+            raise
+        given = ", ".join(f"{p} = {v:g}" for p, v in zip(paths, values, strict=True))
+        raise BadInput("--parameters", given, f"{remedy} ({bad})") from None
 
 
 def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[float]) -> Site:
@@ -423,10 +482,16 @@ Input = Parameter | Posterior
 
 
 def site_at(site: Site, inputs: Sequence[Input], place: Floats) -> Site:
-    """Return a site with the values of inputs at a place of the unit cube, (D,)."""
+    """Return a site with the values of inputs at a place of the unit cube, (D,).
+
+    Raises
+    ------
+    BadInput
+        If the site is invalid with these values together.
+    """
     paths = [path for one in inputs for path in one.paths]
     values = [v for one, at in zip(inputs, place.tolist(), strict=True) for v in one.at(at)]
-    return set_numbers(site, paths, values)
+    return _named(site, paths, values, "choose narrower limits, with which the site is valid")
 
 
 def inputs(

@@ -411,9 +411,25 @@ def plan(
     for i, varied in enumerate(sites):
         groups.setdefault((release_key(varied), varied.standing(layout)), (varied, []))[1].append(i)
     for varied, _ in groups.values():
-        varied.built(layout, 1.0)  # larger blocks may take the room of a barrier
+        _check_room(varied, layout, inputs)
     simulated = tuple((varied, tuple(rows)) for varied, rows in groups.values())
     return SensitivityPlan(site, layout, tuple(inputs), method, cube, seeds, sites, simulated, seed)
+
+
+def _check_room(varied: Site, layout: Layout, inputs: Sequence[Input]) -> None:
+    """Check that larger blocks do not take the room of a barrier.
+
+    Raises
+    ------
+    BadInput
+        If they do; the message names the inputs that determine their sizes.
+    """
+    try:
+        varied.built(layout, 1.0)
+    except BadInput as bad:
+        sizes = [path for one in inputs for path in one.paths if path.endswith(".size")]
+        hint = f", or give --parameters with smaller values of {', '.join(sizes)}" if sizes else ""
+        raise BadInput(bad.field, bad.value, bad.hint + hint) from None
 
 
 def seeds_of(site: Site, releases: int, seed: int) -> Seeds:

@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from processes import refused
 
 from rigdda import MECHANICS, BadInput, Ditch, sites
 from rigdda.agents.designers.constant import constant
@@ -206,9 +207,78 @@ def test_an_entry_that_fails_is_one_line(folder: Path) -> None:
     last = done.stderr.strip().splitlines()[-1]
     assert last.startswith("rigdda: ") and "RuntimeError: no idea" in last
     assert "entries_of_test.py" in done.stderr and "entrant.py" not in done.stderr
-    missing = exam(folder, "nowhere", "--sites", "1")
-    assert missing.returncode == 2
-    assert "name a function that can be imported" in missing.stderr
+
+
+ODD = {
+    "misses": "def f(task):\n    return ()\n",
+    "unsound": "def f(task:\n",
+    "needy": "import no_such_package\n\ndef f(task):\n    return ()\n",
+    "quitter": "import os\nos._exit(3)\n",
+}
+"""Modules by name, of which only the first can be imported."""
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (("--entry", "misses:g"), "--entry = 'misses:g': name a function that can be imported"),
+        (("--entry", "unsound:f"), "--entry = 'unsound:f': correct its module: SyntaxError"),
+        (("--entry", "needy:f"), "--entry = 'needy:f': name a function that can be imported"),
+        (("--entry", "quitter:f"), "--entry = 'quitter:f': its process ended while it was"),
+        (("--entry", "misses:__name__"), "name a function that receives a task"),
+        (("--entry", ""), "--entry = '': give package.module:function"),
+        (
+            ("--entry", "misses:f", "--corridor-entry", "misses:g"),
+            "--corridor-entry = 'misses:g': name a function that can be imported",
+        ),
+        (
+            ("--entry", "misses:f", "--corridor-entry", "nowhere:g"),
+            "--corridor-entry = 'nowhere:g': name package.module:function",
+        ),
+    ],
+)
+def test_an_entry_that_cannot_be_imported_is_refused_before_anything_is_written(
+    options: tuple[str, ...], named: str, tmp_path: Path
+) -> None:
+    for name, text in ODD.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    assert named in refused("exam", *options, "--out", "o", folder=tmp_path)
+    assert not (tmp_path / "o").exists() and not (tmp_path / "runs").exists()
+
+
+def test_the_process_of_an_entry_imports_it_before_anything_is_computed(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def compute(problem: DesignProblem) -> None:
+        raise AssertionError
+
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(scorer, "prepare", compute)
+    asked = specification.part(specification.load(folder / "spec.toml"))
+    known = specification.references(asked.specification, folder / "spec.toml")
+    job = scorer.Scorer(asked, known, "entries_of_test:nowhere", "", tmp_path)
+    with pytest.raises(BadInput, match="name a function that can be imported"):
+        job.play()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_a_folder_with_submissions_belongs_to_an_entry(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    asked = specification.part(specification.load(folder / "spec.toml"))
+    known = specification.references(asked.specification, folder / "spec.toml")
+    first, second = (
+        scorer.Scorer(asked, known, f"entries_of_test:{name}", "", tmp_path)
+        for name in ("broken", "honest")
+    )
+    first._mark_folder()
+    second._read_folder()  # the first entry failed before it submitted anything
+    second._mark_folder()
+    second._keep(scorer.Submission(SITES[0], 60, [[]], 0, 0, []))
+    second._read_folder()
+    with pytest.raises(BadInput, match="an exam of another entry, source file"):
+        first._read_folder()
 
 
 @pytest.mark.slow

@@ -74,8 +74,7 @@ def exam(
     references = specification.references(asked, spec)
     part = specification.part(asked, sites, corridors, budgets, verify, seed)
     specification.check_references(part, references)
-    for name in filter(None, (entry, corridor_entry)):
-        scorer.source_hash_of(name)  # refuses a module that cannot be found
+    scorer.check_functions({"--entry": entry, "--corridor-entry": corridor_entry})
     folder = folder_for(out, f"exam-{entry.rpartition(':')[2]}", *ranking.FILES)
     with recorded_run(folder), progress(part.size) as tick:
         job = scorer.Scorer(part, references, entry, corridor_entry, folder, tick)

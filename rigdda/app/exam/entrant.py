@@ -22,6 +22,8 @@ from rigdda.app.exam.messages import (
     FailRequest,
     FlagRequest,
     Message,
+    Option,
+    ReadyRequest,
     RefusedReply,
     ReleaseRequest,
     SubmitRequest,
@@ -38,6 +40,8 @@ from rigdda.envs.problem import is_vector
 Entry = Callable[[Any], Any]
 """Function that receives a task and returns a layout, or one for each section of a corridor."""
 
+SITE_ENTRY: Option = "--entry"
+CORRIDOR_ENTRY: Option = "--corridor-entry"
 
 SIMULATED = "simulated releases itself ({name}) instead of asking Task.evaluate"
 """Reason for a flag."""
@@ -98,8 +102,8 @@ def refuse_simulations(line: PipeLine) -> None:
         setattr(kind, method, refuse)
 
 
-def load(name: str) -> Entry:
-    """Return the function that is named by "package.module:function".
+def load(option: Option, name: str) -> Entry:
+    """Return the function that is named by "package.module:function" in an option.
 
     Raises
     ------
@@ -108,19 +112,21 @@ def load(name: str) -> Entry:
     """
     module, _, function = name.partition(":")
     if not module or not function:
-        raise BadInput("--entry", name, "give package.module:function")
+        raise BadInput(option, name, "give package.module:function")
     try:
         found = getattr(importlib.import_module(module), function)
     except (ImportError, AttributeError) as error:
         hint = f"name a function that can be imported from this folder ({error})"
-        raise BadInput("--entry", name, hint) from None
+        raise BadInput(option, name, hint) from None
     if not callable(found):
-        raise BadInput("--entry", name, "name a function that receives a task")
+        raise BadInput(option, name, "name a function that receives a task")
     return found
 
 
 def run(pipe: Connection, entry: str, corridor_entry: str) -> None:
-    """Work on tasks until the scorer sends none; the target of the process.
+    """Import the entry, report it and work on tasks until the scorer sends none.
+
+    This is the target of the process.
 
     Parameters
     ----------
@@ -130,21 +136,32 @@ def run(pipe: Connection, entry: str, corridor_entry: str) -> None:
         Names of the functions. If the second is empty, corridors are designed section by section
         with the same money for every metre of road.
     """
-    line, at = PipeLine(pipe), ""
+    line, option, at = PipeLine(pipe), SITE_ENTRY, "correct its module: "
     sys.stdout = sys.stderr  # tables of the command are on standard output
     sys.path.insert(0, os.getcwd())
     refuse_simulations(line)
     try:
-        function = load(entry)
-        other = load(corridor_entry) if corridor_entry else equal_shares(function)
+        function = other = load(option, entry)
+        if corridor_entry:
+            option = CORRIDOR_ENTRY
+            other = load(option, corridor_entry)
+        else:
+            other = equal_shares(function)
+        line.tell(ReadyRequest())
         while (order := line.order()) is not None:
-            at = f"on {order.name}: "
+            option, at = option_of(order, corridor_entry), f"on {order.name}: "
             line.tell(_submission(order, line, function, other))
     except BadInput as bad:
-        line.tell(FailRequest(at + (bad.hint if bad.field == "--entry" else str(bad))))
+        words = bad.hint if bad.field == option else at + str(bad)
+        line.tell(FailRequest(option, words))
     except BaseException as error:
         print_own_frames(error)
-        line.tell(FailRequest(f"{at}{type(error).__name__}: {error}"))
+        line.tell(FailRequest(option, f"{at}{type(error).__name__}: {error}"))
+
+
+def option_of(order: TaskOrder, corridor_entry: str) -> Option:
+    """Return the option that names the function for a task."""
+    return CORRIDOR_ENTRY if corridor_entry and order.money is not None else SITE_ENTRY
 
 
 def print_own_frames(error: BaseException) -> None:

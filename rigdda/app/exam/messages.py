@@ -5,7 +5,7 @@ Nothing that an entry sends is unpickled: messages are checked against the types
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -66,13 +66,22 @@ class FlagRequest(Message, frozen=True):
     reason: str
 
 
-class FailRequest(Message, frozen=True):
-    """Report that the entry raised an error."""
+class ReadyRequest(Message, frozen=True):
+    """Report that the functions are imported, and ask for the first task."""
 
+
+Option = Literal["--entry", "--corridor-entry"]
+"""Option that names a function."""
+
+
+class FailRequest(Message, frozen=True):
+    """Report that the function of an option raised an error or cannot be imported."""
+
+    option: Option
     error: str
 
 
-AnyRequest = ReleaseRequest | SubmitRequest | FlagRequest | FailRequest
+AnyRequest = ReleaseRequest | SubmitRequest | FlagRequest | ReadyRequest | FailRequest
 
 
 class BatchReply(Message, frozen=True):

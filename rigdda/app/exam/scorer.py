@@ -14,7 +14,7 @@ import multiprocessing
 import os
 import resource
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -29,9 +29,13 @@ from rigdda.agents.designers import rule
 from rigdda.agents.designers.store import Store
 from rigdda.app.exam import entrant
 from rigdda.app.exam.counter import ReleaseCounter, from_tables, problems_of
+from rigdda.app.exam.entrant import CORRIDOR_ENTRY, SITE_ENTRY
 from rigdda.app.exam.messages import (
+    AnyRequest,
     FailRequest,
     FlagRequest,
+    Option,
+    ReadyRequest,
     ReleaseRequest,
     SubmitRequest,
     Tables,
@@ -45,6 +49,9 @@ from rigdda.envs.observation import observe
 from rigdda.files import atomic
 
 Tick = Callable[[int, str], None]
+
+Functions = Mapping[Option, str]
+"""Names of the functions by their options; that for corridors may be empty."""
 
 SUBMISSIONS, IDENTITY, EVALUATIONS = "submissions.json", "exam.json", "evaluations.jsonl"
 """Files of a run from which it continues."""
@@ -160,7 +167,7 @@ class Scorer:
         tick: Tick = lambda done, words: None,
     ):
         self.asked, self.references, self.folder, self.tick = asked, references, folder, tick
-        self.entry, self.corridor_entry = entry, corridor_entry
+        self.functions: Functions = {SITE_ENTRY: entry, CORRIDOR_ENTRY: corridor_entry}
         self._store = Store(folder / EVALUATIONS)
         self._done: dict[tuple[str, int], Submission] = {}
 
@@ -184,29 +191,38 @@ class Scorer:
         BadInput
             As `run` does.
         """
-        self._check_folder()
+        self._read_folder()
         for budget in self.asked.budgets:
             self._play(budget)
 
-    def _check_folder(self) -> None:
-        """Read what the folder has of this run, and note to which run it belongs."""
-        names = self.entry, self.corridor_entry
-        code = [source_hash_of(name) for name in names if name]
-        own = [self.asked.specification.key, self.asked.seed, *names, *code, MECHANICS]
-        file, identity = (
-            self.folder / IDENTITY,
-            {"run": msgspec.json.encode([__version__, *own]).decode()},
-        )
-        if file.is_file() and _decoded(file, dict[str, str]) != identity:
+    def _identity(self) -> dict[str, str]:
+        """Return what tells this run from others."""
+        code = [source_hash_of(option, name) for option, name in self.functions.items() if name]
+        own = [self.asked.specification.key, self.asked.seed, *self.functions.values(), *code]
+        return {"run": msgspec.json.encode([__version__, *own, MECHANICS]).decode()}
+
+    def _read_folder(self) -> None:
+        """Read what the folder has of this run.
+
+        Raises
+        ------
+        BadInput
+            If it has submissions of another run.
+        """
+        file, known = self.folder / IDENTITY, self.folder / SUBMISSIONS
+        if not known.is_file():
+            return
+        if file.is_file() and _decoded(file, dict[str, str]) != self._identity():
             hint = "it contains an exam of another entry, source file, seed or version: "
             hint += "name another folder"
             raise BadInput("--out", str(self.folder), hint)
-        with atomic(file) as fresh:
-            fresh.write_bytes(msgspec.json.encode(identity))
-        known = self.folder / SUBMISSIONS
-        if known.is_file():
-            rows = _decoded(known, list[Submission])
-            self._done = {(row.name, row.budget): row for row in rows}
+        rows = _decoded(known, list[Submission])
+        self._done = {(row.name, row.budget): row for row in rows}
+
+    def _mark_folder(self) -> None:
+        """Note to which run the folder belongs."""
+        with atomic(self.folder / IDENTITY) as fresh:
+            fresh.write_bytes(msgspec.json.encode(self._identity()))
 
     def _keep(self, submission: Submission) -> None:
         self._done[submission.name, submission.budget] = submission
@@ -218,28 +234,34 @@ class Scorer:
         orders = [o for o in self.asked.orders(budget) if (o.name, budget) not in self._done]
         if not orders:
             return
-        for order in orders:
-            for problem in problems_of(order):
-                self.tick(len(self._done), f"{order.name}: releases without barriers")
-                prepare(problem)
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         played = []
-        with _process(self.entry, self.corridor_entry) as pipe:
+        with _process(self.functions) as pipe:
+            flags = _imported(pipe, self.functions)
+            self._mark_folder()
+            for order in orders:
+                for problem in problems_of(order):
+                    self.tick(len(self._done), f"{order.name}: releases without barriers")
+                    prepare(problem)
             for order in orders:
                 self.tick(len(self._done), f"{order.name}: {budget:,} releases")
-                played.append(self._task(pipe, order))
+                played.append(self._task(pipe, order, flags))
                 self._keep(played[-1])
+                flags = []
             pipe.send_bytes(b"")
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         for one in played:
             self._keep(msgspec.structs.replace(one, seconds=round(seconds / len(played), 3)))
 
-    def _task(self, pipe: Connection, order: TaskOrder) -> Submission:
-        """Return what the entry submits for a task."""
+    def _task(self, pipe: Connection, order: TaskOrder, flags: Sequence[str]) -> Submission:
+        """Return what the entry submits for a task; `flags` are rules that it broke before."""
         problems = problems_of(order)
         counter = ReleaseCounter(problems, order.budget * len(problems))
-        try:
+        for reason in flags:
+            counter.flag(reason)
+        option = entrant.option_of(order, self.functions[CORRIDOR_ENTRY])
+        with _told(option, self.functions[option], f"on {order.name}: return a layout instead"):
             pipe.send_bytes(encode(order))
             while True:
                 request = decode_request(pipe.recv_bytes())
@@ -247,16 +269,10 @@ class Scorer:
                     pipe.send_bytes(encode(counter.answer(request)))
                 elif isinstance(request, FlagRequest):
                     counter.flag(request.reason)
-                elif isinstance(request, FailRequest):
-                    raise BadInput("--entry", self.entry, request.error)
-                else:
+                elif isinstance(request, SubmitRequest):
                     return _submission(order, problems, counter, request)
-        except (EOFError, ConnectionError, OSError):
-            hint = f"its process ended on {order.name}: return a layout instead"
-            raise BadInput("--entry", self.entry, hint) from None
-        except msgspec.MsgspecError as error:
-            hint = f"it sent an unknown request: use the methods of the task ({error})"
-            raise BadInput("--entry", self.entry, hint) from None
+                else:
+                    raise _failure(request, self.functions)
 
     def seeds(self, name: str, budget: int, chosen: int = 0) -> list[int]:
         """Return the seeds of the verification of a task.
@@ -357,12 +373,29 @@ def _decoded(file: Path, of: type[Any]) -> Any:
         raise BadInput("exam", str(file), hint) from None
 
 
+def check_functions(functions: Functions) -> None:
+    """Check that functions can be imported, in a process as that of an exam.
+
+    Raises
+    ------
+    BadInput
+        If a name has another form than "package.module:function", or cannot be imported.
+    """
+    for option, name in functions.items():
+        if name or option == SITE_ENTRY:
+            source_hash_of(option, name)
+    with _process(functions) as pipe:
+        _imported(pipe, functions)
+        pipe.send_bytes(b"")
+
+
 @contextmanager
-def _process(entry: str, corridor_entry: str) -> Iterator[Connection]:
+def _process(functions: Functions) -> Iterator[Connection]:
     """Start a process of an entry and yield the connection to it."""
     spawn = multiprocessing.get_context("spawn")
     pipe, other = spawn.Pipe()
-    child = spawn.Process(target=entrant.run, args=(other, entry, corridor_entry))
+    names = functions[SITE_ENTRY], functions[CORRIDOR_ENTRY]
+    child = spawn.Process(target=entrant.run, args=(other, *names))
     child.start()
     other.close()
     try:
@@ -375,7 +408,47 @@ def _process(entry: str, corridor_entry: str) -> Iterator[Connection]:
         pipe.close()
 
 
-def source_hash_of(entry: str) -> str:
+def _imported(pipe: Connection, functions: Functions) -> list[str]:
+    """Wait until a process has imported its functions; return the rules that they broke meanwhile.
+
+    Raises
+    ------
+    BadInput
+        If they cannot be imported.
+    """
+    flags: list[str] = []
+    with _told(SITE_ENTRY, functions[SITE_ENTRY], "while it was imported: correct the module"):
+        while not isinstance(request := decode_request(pipe.recv_bytes()), ReadyRequest):
+            if not isinstance(request, FlagRequest):
+                raise _failure(request, functions)
+            flags.append(request.reason)
+    return flags
+
+
+def _failure(request: AnyRequest, functions: Functions) -> BadInput:
+    """Return the error that a request reports, or that of a request which is out of turn."""
+    if isinstance(request, FailRequest):
+        return BadInput(request.option, functions[request.option], request.error)
+    hint = f"it sent a {type(request).__name__} out of turn: use the methods of the task"
+    return BadInput(SITE_ENTRY, functions[SITE_ENTRY], hint)
+
+
+@contextmanager
+def _told(option: Option, name: str, ended: str) -> Iterator[None]:
+    """Turn errors of the connection into errors that name a function.
+
+    `ended` says when its process ended, and the remedy.
+    """
+    try:
+        yield
+    except (EOFError, ConnectionError, OSError):
+        raise BadInput(option, name, f"its process ended {ended}") from None
+    except msgspec.MsgspecError as error:
+        hint = f"it sent an unknown request: use the methods of the task ({error})"
+        raise BadInput(option, name, hint) from None
+
+
+def source_hash_of(option: Option, entry: str) -> str:
     """Return a hash of the file of an entry, which is found without importing it.
 
     Raises
@@ -384,7 +457,7 @@ def source_hash_of(entry: str) -> str:
         If the name has another form than "package.module:function", or there is no such module.
     """
     if not entry.partition(":")[2]:
-        raise BadInput("--entry", entry, "give package.module:function")
+        raise BadInput(option, entry, "give package.module:function")
     names = entry.partition(":")[0].split(".")
     places: Sequence[str] | None = [os.getcwd(), *sys.path]
     for i, _ in enumerate(names):
@@ -392,7 +465,7 @@ def source_hash_of(entry: str) -> str:
         if spec is None:
             hint = "name package.module:function of a module in this folder or an installed one"
             hint += ", without .py" if entry.partition(":")[0].endswith(".py") else ""
-            raise BadInput("--entry", entry, hint)
+            raise BadInput(option, entry, hint)
         places = spec.submodule_search_locations
     file = Path(spec.origin or "") if spec is not None else Path()
     return hashlib.sha256(file.read_bytes()).hexdigest()[:16] if file.is_file() else ""

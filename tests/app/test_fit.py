@@ -140,7 +140,7 @@ def test_only_numbers_of_the_site_are_fitted(path):
         ("event,run_out_m\nblock,3,1\n", "row 1 = 'block,3,1': give 2 cells"),
         ("event,run_out_m\n,3\n", "row 1 event = '': choose small, face or "),
         ("event,run_out_m,run_out_m\nblock,3,4\n", "a different name"),
-        ("event,run_out_m,event\nblock,3,block\n", "observed = 'event': give each column"),
+        ("event,run_out_m,event\nblock,3,block\n", "seen.csv = 'event': give each column"),
         ("event,run_out_m\nblock,4_0\n", "row 1 run_out_m = '4_0': give a number"),
         ("event,run_out_m\nblock," + 140_000 * "3" + "\n", "repair line 2"),
         ("", "name its columns"),

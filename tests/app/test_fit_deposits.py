@@ -142,7 +142,16 @@ def test_a_deposit_is_spread_evenly_within_its_intervals() -> None:
         ("event,start_m,end_m,share,releases\nblock,0,9,1,x\nblock,9,12,1,x\n", "releases = 'x'"),
         ("event,start_m,end_m,share\nrain,0,9,1\nrain,9,12,1\n", "row 1 event = 'rain'"),
         ("event,station_m,quantity,value\nblock,20,speed,3\n", "velocity"),
-        ("event,station_m,quantity,value\nblock,500,height,3\n", "station = 500"),
+        ("event,station_m,quantity,value\nblock,500,height,3\n", "row 1 station_m = 500"),
+        ("event,station_m,quantity,value\nblock,-9,velocity,3\n", "row 1 station_m = -9"),
+        (
+            "event,station_m,quantity,value\nblock,1,velocity,3\n",
+            "beyond 1 m, where the source face",
+        ),
+        (
+            "event,station_m,quantity,value\nmass,0.4,height,3\n",
+            "beyond 0.5 m, where the source mass",
+        ),
         ("event,station_m,quantity,value\nblock,20,velocity,-3\n", "row 1 value = -3"),
         ("event,station_m,quantity,value\nblock,20,velocity,fast\n", "give a number"),
     ],
@@ -152,6 +161,39 @@ def test_a_table_of_observations_is_checked(text: str, named: str, tmp_path: Pat
     options = ("--parameters", "surfaces.rock.rolling")
     line = refused("fit", "quick", "seen.csv", *options, folder=tmp_path)
     assert named in line
+
+
+def test_an_error_names_the_file_of_several(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("event,run_out_m\nblock,30\nblock,31\n")
+    (tmp_path / "b.csv").write_text("event,run_out_m\nblock,30\ngrup,31\n")
+    files = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    with pytest.raises(BadInput, match=r"observed .*b\.csv row 2 event = 'grup'"):
+        read(files, SITE)
+    (tmp_path / "b.csv").write_text("event,start_m,end_m,share\nblock,0,9,0\nblock,9,12,0\n")
+    with pytest.raises(BadInput, match=r"observed .*b\.csv share of block"):
+        read(files, SITE)
+    (tmp_path / "b.csv").write_text("event,run_out\nblock,30\n")
+    with pytest.raises(BadInput, match=r"observed .*b\.csv = 'event, run_out'"):
+        read(files, SITE)
+
+
+def test_a_station_within_the_source_is_accepted(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("event,station_m,quantity,value\n" + 3 * "block,2,velocity,1\n")
+    (one,) = read([tmp_path / "a.csv"], SITE).values()
+    assert one.station == 2.0 and one.values.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_observations_that_tell_nothing_identify_nothing() -> None:
+    parameters = [parse("surfaces.rock.restitution"), parse("surfaces.rock.rolling=0.2:0.6")]
+    observed = {"block": np.array([1.0, 2.0, 4.0])}
+    found = fit.search(
+        SITE, observed, parameters, lambda values, seeds: {"block": np.zeros(1)}, 8, 10, 0,
+        lambda done, words: None,
+    )  # fmt: skip
+    assert fit.identified(found) == [False, False]
+    low, high = found.posterior.interval(0.95)
+    assert low == pytest.approx([0.02, 0.21], abs=0.002)  # the middle 95 % of the ranges
+    assert high == pytest.approx([0.78, 0.59], abs=0.002)
 
 
 def test_points_are_fitted_to_run_outs_only(tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ def _marks(path: Path, site: Site) -> Floats | None:
     low, high = site.slope.points[0][0], site.slope.points[-1][0]
     found = []
     for k, row in enumerate(rows):
-        where = f"observed row {k + 1} {MARK}"
+        where = f"observed {path} row {k + 1} {MARK}"
         try:
             value = check.parsed(row[MARK] or "")
         except ValueError:

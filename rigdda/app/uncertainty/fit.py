@@ -528,13 +528,15 @@ def search(
 def _posterior(parameters: Sequence[Parameter], trials: Trials, seed: int) -> Posterior:
     """Return the posterior of the parameters by bootstrap of the observed values.
 
-    If all parameter sets have the same scores, it is the set of all values tried.
+    If all parameter sets have the same scores, the observations tell nothing, and the posterior is
+    spread evenly over the ranges of the parameters.
     """
     paths, table = [parameter.path for parameter in parameters], np.array(trials.table)
-    if (table == table[0]).all():
-        every = np.array([candidate.values for candidate in trials.tried])
-        return Posterior.of(paths, every, np.ones(len(every)))
     rng = np.random.default_rng([seed, 1])
+    if (table == table[0]).all():
+        spread = qmc.LatinHypercube(len(paths), rng=rng).random(RESAMPLES)
+        every = np.array([trials.values(place) for place in spread])
+        return Posterior.of(paths, every, np.ones(RESAMPLES))
     count = table.shape[1]
     drawn = rng.multinomial(count, np.full(count, 1.0 / count), size=RESAMPLES) / count
     places = best_places(np.array(trials.places), table @ drawn.T, rng)

@@ -22,7 +22,7 @@ from rigdda.agents.limits import JOB_RELEASES
 from rigdda.app.reports.stations import QUANTITIES
 from rigdda.files import is_file
 from rigdda.files import read as read_text
-from rigdda.passages import check_stations
+from rigdda.passages import ends
 from rigdda.rounding import chainage
 
 Floats = NDArray[np.float64]
@@ -107,7 +107,8 @@ def read(paths: Sequence[Path], site: Site) -> dict[str, DataSet]:
     BadInput
         If a file is not a table with the columns of one of the three forms and, for a site with
         several events, `event`; if a run-out is beyond the road, where computed run-outs are cut
-        off; if intervals have gaps; or if there are fewer than three values or two intervals.
+        off; if no block of an event can pass a station; if intervals have gaps; or if there are
+        fewer than three values or two intervals.
     """
     found: dict[str, DataSet] = {}
     for path in paths:
@@ -126,8 +127,9 @@ def _read(path: Path, site: Site) -> list[DataSet]:
     if not is_file(path):
         raise BadInput("observed", str(path), "name a CSV file with event and run_out_m")
     only = site.event_names[0] if len(site.events) == 1 else ""
+    where = f"observed {path}"
     names, rows = _table(path, only)
-    each = list(_rows(names, rows))
+    each = list(_rows(where, names, rows))
     for field, row in each:
         event = row.setdefault("event", only) or only
         if event not in site.event_names:
@@ -135,7 +137,7 @@ def _read(path: Path, site: Site) -> list[DataSet]:
         row["event"] = event
     if "run_out_m" in names:
         return _run_outs(each, site)
-    return _passages(each, site) if "station_m" in names else _deposits(each, names, site)
+    return _passages(each, site) if "station_m" in names else _deposits(where, each, names, site)
 
 
 Row = tuple[str, dict[str, str]]
@@ -159,18 +161,18 @@ def _table(path: Path, only: str) -> tuple[list[str], list[list[str]]]:
     )
     if sum(forms) != 1 or not ("event" in names or only):
         hint = f"name its columns event and {FORMS} in the first row"
-        raise BadInput("observed", ", ".join(names), hint)
-    check.distinct("observed", names)
+        raise BadInput(f"observed {path}", ", ".join(names), hint)
+    check.distinct(f"observed {path}", names)
     return names, rows
 
 
-def _rows(names: list[str], rows: list[list[str]]) -> Iterator[Row]:
-    """Yield a name for each row of a table and its cells by column."""
+def _rows(where: str, names: list[str], rows: list[list[str]]) -> Iterator[Row]:
+    """Yield a name for each row of the table `where` and its cells by column."""
     for i, row in enumerate(rows):
         if len(row) != len(names):
             hint = f"give {len(names)} cells, one per column; use a decimal point in numbers"
-            raise BadInput(f"observed row {i + 1}", ",".join(row), hint)
-        yield f"observed row {i + 1}", dict(zip(names, row, strict=True))
+            raise BadInput(f"{where} row {i + 1}", ",".join(row), hint)
+        yield f"{where} row {i + 1}", dict(zip(names, row, strict=True))
 
 
 def _number(
@@ -204,8 +206,7 @@ def _passages(rows: Sequence[Row], site: Site) -> list[DataSet]:
     """Return quantities of passages by event, station and quantity."""
     found: dict[tuple[str, float, str], list[float]] = {}
     for row in rows:
-        station = _number(row, "station_m")
-        check_stations(site, (station,))
+        station = _station(row, site)
         quantity = row[1]["quantity"]
         check.one_of(f"{row[0]} quantity", quantity, tuple(QUANTITIES))
         value = _number(row, "value", -check.LARGEST_NUMBER if "height" in quantity else 0.0)
@@ -216,7 +217,29 @@ def _passages(rows: Sequence[Row], site: Site) -> list[DataSet]:
     ]
 
 
-def _deposits(rows: Sequence[Row], names: Sequence[str], site: Site) -> list[DataSet]:
+def _station(row: Row, site: Site) -> float:
+    """Return the chainage of a station that blocks of the event can pass.
+
+    Raises
+    ------
+    BadInput
+        If it is not within the profile, or not downhill of the upper end of the source.
+    """
+    station, (low, high) = _number(row, "station_m"), ends(site)
+    if not low < station < high:
+        hint = f"give a chainage within the profile, between {low:g} and {high:g} m"
+        raise BadInput(f"{row[0]} station_m", station, hint)
+    event = row[1]["event"]
+    source = site.source(site.event(event).source)
+    first = min(source.band or [x for _, piece in source.pieces() for x, _ in piece])
+    if station <= first:
+        hint = f"give a chainage beyond {first:g} m, where the source {source.name} begins: no "
+        hint += f"block of the event {event} passes a station uphill of it"
+        raise BadInput(f"{row[0]} station_m", station, hint)
+    return station
+
+
+def _deposits(where: str, rows: Sequence[Row], names: Sequence[str], site: Site) -> list[DataSet]:
     """Return deposits by event."""
     (amount,) = (name for name in AMOUNTS if name in names)
     found: dict[str, list[tuple[Row, float, float, float]]] = {}
@@ -224,10 +247,12 @@ def _deposits(rows: Sequence[Row], names: Sequence[str], site: Site) -> list[Dat
         start = _number(row, "start_m", site.slope.points[0][0])
         end = _number(row, "end_m", start, site.slope.points[-1][0])
         found.setdefault(row[1]["event"], []).append((row, start, end, _number(row, amount, 0.0)))
-    return [_deposit(event, own, amount) for event, own in found.items()]
+    return [_deposit(where, event, own, amount) for event, own in found.items()]
 
 
-def _deposit(event: str, rows: list[tuple[Row, float, float, float]], amount: str) -> DataSet:
+def _deposit(
+    file: str, event: str, rows: list[tuple[Row, float, float, float]], amount: str
+) -> DataSet:
     """Return the deposit in the rows of an event."""
     rows = sorted(rows, key=lambda row: row[1])
     ends = [rows[0][1]]
@@ -244,11 +269,11 @@ def _deposit(event: str, rows: list[tuple[Row, float, float, float]], amount: st
     amounts = np.array([row[3] for row in rows])
     if len(rows) < 2 or not amounts.any():
         hint = "give two intervals or more, and rock in at least one"
-        raise BadInput(f"observed {amount} of {event}", amounts.tolist(), hint)
+        raise BadInput(f"{file} {amount} of {event}", amounts.tolist(), hint)
     counts = {row[0][1].get("releases", "1") for row in rows}
     if len(counts) > 1:
         hint = "give the same number of releases in all rows of an event"
-        raise BadInput(f"observed releases of {event}", ", ".join(sorted(counts)), hint)
+        raise BadInput(f"{file} releases of {event}", ", ".join(sorted(counts)), hint)
     (text,) = counts
     if not text.isdecimal():
         raise BadInput(f"{rows[0][0][0]} releases", text, "give a whole number")

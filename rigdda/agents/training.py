@@ -266,8 +266,20 @@ def methods(policy: Policy, table: ForecastTable, problem: DesignProblem) -> dic
     return {name: layout if problem.fits(layout) else () for name, layout in found.items()}
 
 
+def comparison_sites(count: int) -> list[str]:
+    """Return the names of the first validation sites.
+
+    Raises
+    ------
+    BadInput
+        If there are fewer than `count`.
+    """
+    names = sites.split(VALIDATION)
+    return list(names[: check.integer("--compare", count, 0, len(names))])
+
+
 def compare(
-    policy: Policy, out: Path, terms: Terms, count: int, releases: int, tick: Tick
+    policy: Policy, out: Path, terms: Terms, names: Sequence[str], releases: int, tick: Tick
 ) -> list[Compared]:
     """Compare a policy with simple rules on validation sites.
 
@@ -279,8 +291,8 @@ def compare(
         The folder of its training.
     terms : Terms
         The terms of its training.
-    count : int
-        Number of the first validation sites that are tried.
+    names : sequence of str
+        The validation sites that are tried, see `comparison_sites`.
     releases : int
         Number of fresh releases of each layout, the same for all methods.
     tick : callable
@@ -292,7 +304,7 @@ def compare(
         If a simulation diverges.
     """
     table, store = table_of(terms, out, tick), Store(out / "evaluations.jsonl")
-    return compared(policy, table, sites.split(VALIDATION)[:count], releases, store, tick)
+    return compared(policy, table, names, releases, store, tick)
 
 
 def compared(

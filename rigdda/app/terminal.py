@@ -154,6 +154,13 @@ checks_option = click.option(
 )  # fmt: skip
 
 
+def typed(*names: str) -> list[str]:
+    """Return those of some parameters of the command whose options the user typed."""
+    context = click.get_current_context()
+    typed = click.core.ParameterSource.COMMANDLINE
+    return [name for name in names if context.get_parameter_source(name) is typed]
+
+
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun, which is in the plural unless the number is 1."""
     return f"{number:,} {noun}{'' if number == 1 else 's'}"

@@ -524,7 +524,15 @@ def test_a_terminal_sees_progress(toml: Path, tmp_path: Path) -> None:
         (("simulate", "quick", "--station", "inf"), "--station = 'inf': give a finite number"),
         (
             ("train", "--model", "value", "--simulate", "3"),
-            "--algorithm and --simulate are for --model policy",
+            "--algorithm, --simulate, --compare and --verify are for --model policy",
+        ),
+        (("train", "--model", "value", "--compare", "6"), "are for --model policy"),
+        (("train", "--model", "corridor", "--verify", "200"), "are for --model policy"),
+        (("train", "--model", "corridor", "--algorithm", "gradient"), "are for --model policy"),
+        (("train", "--compare", "100000"), "--compare = 100000: give a whole number of at least 0"),
+        (
+            ("design", "quick", "--ground-samples", "0", "--posterior", "posterior.csv"),
+            "--posterior is for the comparison on other grounds: leave it out",
         ),
     ],
 )
@@ -532,3 +540,4 @@ def test_an_option_outside_its_range_says_which_numbers_are_accepted(
     arguments: tuple[str, ...], line: str, tmp_path: Path
 ) -> None:
     assert line in refused(*arguments, folder=tmp_path)
+    assert list(tmp_path.iterdir()) == []

@@ -147,6 +147,9 @@ def design(
     from rigdda.app.reports import design_report as report
     from rigdda.app.uncertainty.parameters import read_posterior
 
+    if posterior is not None and not grounds:
+        words = "--posterior is for the comparison on other grounds: leave it out, or give "
+        raise click.UsageError(f"{words}--ground-samples above 0")
     problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone, checks)
     fitted = None if posterior is None else read_posterior(posterior, problem.site)
     folder = folder_for(

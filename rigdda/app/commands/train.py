@@ -17,6 +17,7 @@ from rigdda.app.terminal import (
     recorded_run,
     seed_option,
     show,
+    typed,
 )
 
 TRAINING_SITES = {"policy": 0, "value": 96, "corridor": 12}
@@ -39,9 +40,10 @@ COMPARISON = "comparison.csv"
               help="For a policy: number of promising layouts of each site to simulate for a "
               "second stage of learning.")  # fmt: skip
 @click.option("--compare", type=WholeNumber(0), default=6, show_default=True, metavar="N",
-              help="Number of validation sites for the comparison of a policy with simple "
+              help="For a policy: number of validation sites for the comparison with simple "
               "rules.")  # fmt: skip
-@count_option("--verify", 10, 200, "Number of new releases for each layout of the comparison.")
+@count_option("--verify", 10, 200, "For a policy: number of new releases for each layout of the "
+              "comparison.")  # fmt: skip
 @seed_option("Seed of all random numbers.", SEED)
 @out_option("train")
 def train(
@@ -70,8 +72,9 @@ def train(
     `rl`.
     """
     number = sites or TRAINING_SITES[model]
-    if model != "policy" and (simulate or algorithm != "gradient"):
-        raise click.UsageError("--algorithm and --simulate are for --model policy: leave them out")
+    if model != "policy" and typed("algorithm", "simulate", "compare", "verify"):
+        words = "--algorithm, --simulate, --compare and --verify are for --model policy"
+        raise click.UsageError(f"{words}: leave them out")
     if model == "policy":
         _policy(number, algorithm, simulate, compare, verify, seed, out)
     elif model == "value":
@@ -90,11 +93,12 @@ def _policy(
     from rigdda.envs import forecast_table
 
     terms = training.Terms(sites, algorithm, simulate, seed)
+    compared = training.comparison_sites(compare)
     number = sites or len(forecast_table.load().rows("train"))
     folder = folder_for(out, "train", *training.FILES, COMPARISON)
     with recorded_run(folder), progress(max(number, compare, training.MEMBERS)) as tick:
         policy = training.train(terms, folder, tick)
-        rows = training.compare(policy, folder, terms, compare, verify, tick)
+        rows = training.compare(policy, folder, terms, compared, verify, tick)
         if rows:
             tables.write_rows(folder / COMPARISON, [asdict(row) for row in rows])
     if rows:

@@ -37,6 +37,11 @@ def is_file(path: str | os.PathLike[str]) -> bool:
     return os.path.isfile(path)
 
 
+def is_folder(path: str | os.PathLike[str]) -> bool:
+    """Return whether there is a folder of this name; a name that no folder can have is none."""
+    return os.path.isdir(path)
+
+
 PART = "part-"
 """Beginning of the suffix of a temporary file."""
 

@@ -66,13 +66,23 @@ def main(argv: Sequence[str] | None = None) -> int:
         return fail(str(stop), stop.code)
     except OSError as error:
         bad = isinstance(error, BAD_PATH) or error.errno == errno.ENAMETOOLONG
-        return fail(str(error), 2 if bad else 1)
+        return fail(_bad_path(error), 2) if bad else fail(str(error), 1)
     except Exception as error:
         from rigdda import BadInput, Error
 
         if not isinstance(error, Error):
             raise
         return fail(str(error), 2 if isinstance(error, BadInput) else 1)
+
+
+def _bad_path(error: OSError) -> str:
+    """Return the message of an error that is caused by a path: the path and what to do."""
+    from rigdda import BadInput
+
+    if error.filename is None:
+        return str(error)
+    hint = f"name a file or folder that can be used here ({error.strerror})"
+    return str(BadInput("path", error.filename, hint))
 
 
 def _run(argv: Sequence[str]) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -153,6 +154,11 @@ def compose(name: str, file: Path, request: SiteRequest) -> tuple[str, Profile]:
     return text, profile
 
 
+LONGEST_NAME = 200
+"""Greatest length of the name of a site of which a file has the name [bytes]; operating systems
+allow 255 with the ending."""
+
+
 def file_of(name: str, out: Path | None) -> Path:
     """Return the file to write, by default the name of the site with the ending .toml.
 
@@ -162,6 +168,9 @@ def file_of(name: str, out: Path | None) -> Path:
         If the name cannot be that of a file, or the file has another ending.
     """
     if out is None:
+        if len(os.fsencode(name)) > LONGEST_NAME:
+            hint = f"use a name of at most {LONGEST_NAME} bytes, or give the file with --out"
+            raise BadInput("NAME", name, hint)
         if not re.fullmatch(r"[\w][\w .()-]*", name):
             raise BadInput("NAME", name, "use letters, digits, spaces, - and _, or give --out")
         return Path(f"{name}.toml")
@@ -176,13 +185,17 @@ def write(path: Path, text: str) -> None:
     Raises
     ------
     BadInput
-        If there is a file of that name, which may have been edited.
+        If there is a file of that name, which may have been edited, or it cannot be written.
     """
-    if path.exists():
+    if os.path.exists(path):
         hint = "name another file, or remove this one: it may have been edited and is not replaced"
         raise BadInput("--out", str(path), hint)
-    with atomic(path) as part:
-        part.write_text(text, encoding="utf-8")
+    try:
+        with atomic(path) as part:
+            part.write_text(text, encoding="utf-8")
+    except OSError as error:
+        hint = f"name a file that can be written ({error.strerror})"
+        raise BadInput("--out", str(path), hint) from None
 
 
 def _sorted(option: str, span: Span) -> Span:

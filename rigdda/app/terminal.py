@@ -368,6 +368,7 @@ def _recorded(folder: Path, site: Site | None, before: set[Stamp]) -> Iterator[N
     if context is None:  # a function that is called from Python has no command to record
         yield
         return
+    _check_record(folder)
     command, typed = str(context.info_name), context.find_root().obj or []
     record = RunRecord.begin(command, list(typed), context.params, site)
     known = read(folder)
@@ -383,6 +384,23 @@ def _recorded(folder: Path, site: Site | None, before: set[Stamp]) -> Iterator[N
     record.end(sorted(written | {name for name in earlier if (folder / name).exists()}))
     record.write(folder)
     context.call_on_close(lambda: _add_findings(record, folder, context))
+
+
+def _check_record(folder: Path) -> None:
+    """Check that the record can be written into a folder.
+
+    Raises
+    ------
+    BadInput
+        If a folder has its name.
+    """
+    from rigdda import BadInput
+    from rigdda.agents.run_record import RECORD_FILE
+
+    file = folder / RECORD_FILE
+    if file.is_dir():
+        hint = "this file cannot be overwritten: move it away or name another folder"
+        raise BadInput("--out", str(file), hint)
 
 
 def _earlier(known: dict[str, RunRecord], command: str) -> list[str]:

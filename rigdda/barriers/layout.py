@@ -22,7 +22,7 @@ from rigdda.barriers.removal import Removal
 from rigdda.barriers.wall import Wall
 from rigdda.errors import BadInput
 from rigdda.fields import about
-from rigdda.files import atomic, read
+from rigdda.files import atomic, is_file, read
 from rigdda.ground.terrain import Terrain
 
 Built = Standing | Earthwork
@@ -174,7 +174,7 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
         occurs twice.
     """
     file = Path(path)
-    if not file.is_file():
+    if not is_file(file):
         raise BadInput("layout", str(path), "name an existing TOML or JSON file")
     form = "JSON" if file.suffix == ".json" else "TOML"
     return parse_layout(read("layout", file), str(path), form)

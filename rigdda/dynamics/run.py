@@ -6,7 +6,6 @@ import os
 import zipfile
 import zlib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -18,7 +17,7 @@ from rigdda.barriers import Fence, GravityWall
 from rigdda.barriers.base import STANDS
 from rigdda.dynamics.monitors import CROSSING, FAILED, HIT
 from rigdda.errors import BadInput
-from rigdda.files import atomic
+from rigdda.files import atomic, is_file
 from rigdda.ground.terrain import Terrain
 from rigdda.model.scene import Scene, scene_from_json, scene_to_json
 
@@ -204,7 +203,7 @@ class Run:
         BadInput
             If the file is missing or is not a run.
         """
-        if not Path(path).is_file():
+        if not is_file(path):
             raise BadInput("run file", str(path), "name an existing .npz file")
         try:
             with np.load(path) as stored:

@@ -26,7 +26,7 @@ from rigdda import check
 from rigdda.barriers import describe
 from rigdda.barriers.base import STANDS
 from rigdda.errors import BadInput
-from rigdda.files import atomic
+from rigdda.files import atomic, is_file
 from rigdda.geometry import polygon_properties
 from rigdda.ground.terrain import Terrain
 from rigdda.model.scene import Scene
@@ -288,7 +288,7 @@ def read_record(path: str | os.PathLike[str]) -> str:
         If the file is missing, is not a replay or contains no such inputs.
     """
     file = rrd_path(path)
-    if not file.is_file():
+    if not is_file(file):
         raise BadInput("replay file", str(path), "name an existing .rrd file")
     try:
         chunks = RrdReader(file).stream().filter(content=RECORD, is_static=True).to_chunks()

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from rigdda.errors import BadInput, Error
+from rigdda.files import is_file
 
 
 def open_viewer(path: str | os.PathLike[str]) -> None:
@@ -22,7 +23,7 @@ def open_viewer(path: str | os.PathLike[str]) -> None:
         If the viewer fails, for example without a display.
     """
     file = rrd_path(path)
-    if not file.is_file():
+    if not is_file(file):
         raise BadInput("replay file", str(path), "name an existing .rrd file")
     with file.open("rb") as head:
         if head.read(3) != b"RRF":

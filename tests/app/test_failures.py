@@ -104,6 +104,9 @@ def test_a_folder_that_cannot_be_written_is_one_line(
         (("design", "chute.toml"), "layout.toml"),
         (("design", "chute.toml"), "cost.png"),
         (("design", "chute.toml"), "problem.json"),
+        (("design", "chute.toml"), "run.json"),
+        (("simulate", "chute.toml"), "run.json"),
+        (("validate",), "run.json"),
         (("fidelity", "chute.toml"), "fidelity.csv"),
         (("replay", "chute.toml"), "episode.rrd"),
         (("study", "study.toml"), "study.csv"),
@@ -127,6 +130,44 @@ def test_what_is_in_the_way_of_a_file_is_said_before_any_computing(
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and f"--out = 'o/{file}'" in err and "another folder" in err
     assert [path.name for path in Path("o").iterdir()] == [file]
+
+
+LONG = "long" * 80
+
+
+@pytest.mark.parametrize(
+    ("command", "field"),
+    [
+        (("simulate", "chute.toml", "--layout", LONG), "layout"),
+        (("design", "chute.toml", "--posterior", LONG), "--posterior"),
+        (("report", LONG), "RESULTS"),
+        (("replay", f"{LONG}.npz"), "run file"),
+        (("replay", f"{LONG}.rrd"), "replay file"),
+        (("repeat", f"{LONG}.rrd"), "replay file"),
+        (("open", f"{LONG}.toml"), "SITE"),
+        (("study", f"{LONG}.toml"), "study"),
+    ],
+)
+def test_a_name_that_no_file_can_have_is_named(
+    command: tuple[str, ...], field: str, chute: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(list(command)) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"rigdda: {field} = 'longlong") and err.count("\n") == 1
+    assert "name " in err and "Errno" not in err
+    assert list(Path().iterdir()) == [chute]
+
+
+def test_a_path_that_cannot_be_used_is_named_with_its_remedy(
+    chute: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*_: Any) -> None:
+        raise NotADirectoryError(20, "Not a directory", "chute.toml/x")
+
+    monkeypatch.setattr(rigdda, "load_layout", fail)
+    assert cli.main(["simulate", "chute.toml", "--layout", "x"]) == 2
+    said = "path = 'chute.toml/x': name a file or folder that can be used here (Not a directory)"
+    assert capsys.readouterr().err == f"rigdda: {said}\n"
 
 
 @pytest.mark.parametrize(

@@ -223,6 +223,23 @@ def test_names_of_sites_and_sources_may_have_any_letters(tmp_path):
     assert "/" in refused("new", "a/b", "--profile", "survey.csv", folder=tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("name", "options", "said"),
+    [
+        ("a", ("--out", "/proc/a.toml"), "--out = '/proc/a.toml': name a file that can be written"),
+        ("a", ("--out", "survey.csv/a.toml"), "--out = 'survey.csv/a.toml': name a file that"),
+        ("a", ("--out", 300 * "a" + ".toml"), "name a file that can be written (File name too"),
+        (300 * "a", (), "use a name of at most 200 bytes, or give the file with --out"),
+        (101 * "ö", (), "use a name of at most 200 bytes, or give the file with --out"),
+    ],
+)
+def test_a_file_that_cannot_be_written_is_named(tmp_path, name, options, said):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    line = refused("new", name, "--profile", "survey.csv", *ASKED, *options, folder=tmp_path)
+    assert said in line and "Errno" not in line
+    assert [file.name for file in tmp_path.iterdir()] == ["survey.csv"]
+
+
 def test_a_drawing_becomes_a_site(tmp_path):
     ezdxf = pytest.importorskip("ezdxf")
     points = [tuple(map(float, row.split(","))) for row in GRID.splitlines()[1:]]

@@ -143,6 +143,7 @@ def design(
     another problem (problem.json) is refused.
     """
     from rigdda.agents.designers.store import PROBLEM_FILE, record_problem
+    from rigdda.agents.run_record import RECORD_FILE
     from rigdda.app import design as job
     from rigdda.app.reports import design_report as report
     from rigdda.app.uncertainty.parameters import read_posterior
@@ -153,7 +154,12 @@ def design(
     problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone, checks)
     fitted = None if posterior is None else read_posterior(posterior, problem.site)
     folder = folder_for(
-        out, f"design-{problem.site.name}", *report.DESIGN_FILES, *report.BAND_FILES, PROBLEM_FILE
+        out,
+        f"design-{problem.site.name}",
+        *report.DESIGN_FILES,
+        *report.BAND_FILES,
+        PROBLEM_FILE,
+        RECORD_FILE,
     )
     record_problem(folder, problem, *report.DESIGN_FILES)
     with recorded_run(folder, problem.site):

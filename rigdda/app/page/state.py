@@ -20,7 +20,7 @@ import tomli_w
 from rigdda import BadInput, Error, Layout, Site, load_layout
 from rigdda.app.page import edits
 from rigdda.barriers.layout import parse_layout, to_tables
-from rigdda.files import atomic, read
+from rigdda.files import atomic, is_file, is_folder, read
 from rigdda.model import site_names
 
 SITE, LAYOUT, ALTERNATIVES, HISTORY = "site.toml", "layout.toml", "layouts", "history.json"
@@ -80,10 +80,10 @@ def place(target: str | os.PathLike[str] | None) -> Place:
         If there is no such file, folder or site.
     """
     path = Path("." if target is None else target)
-    if path.is_dir():
+    if is_folder(path):
         return Place(path / SITE, path)
     if path.suffix == ".toml":
-        if not path.is_file():
+        if not is_file(path):
             raise BadInput("SITE", str(path), "name an existing site file, or its folder")
         beside = path.parent if path.name == SITE else path.with_suffix(BESIDE)
         return Place(path, beside)

@@ -25,7 +25,7 @@ from rigdda import BadInput, DoubtfulInput, Site
 from rigdda.agents import run_record
 from rigdda.agents.run_record import RunRecord
 from rigdda.app.reports.wording import at_most, euros, figure, percent
-from rigdda.files import read
+from rigdda.files import is_folder, read
 from rigdda.rounding import NumberForm, Rounding, rounded
 
 FIELD = "RESULTS"
@@ -133,7 +133,7 @@ def open_all(paths: Sequence[Path]) -> list[ResultsFolder]:
 
 def _records(path: Path) -> dict[str, RunRecord]:
     """Return the records of a results folder after checking that it is complete."""
-    if not path.is_dir():
+    if not is_folder(path):
         hint = "name an existing folder that rigdda design, simulate or study wrote"
         raise BadInput(FIELD, str(path), hint)
     records = run_record.read(path)

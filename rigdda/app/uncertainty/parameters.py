@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Layout, Site, check, fields
+from rigdda.files import is_file
 from rigdda.files import read as read_text
 from rigdda.ground.grounds import GROUNDS, OTHER, USUAL
 from rigdda.ground.surface import RETIRED
@@ -459,7 +460,7 @@ def read_posterior(path: Path, site: Site) -> Posterior:
     BadInput
         If there is no such file, or it is not a table of weights and valid numbers of the site.
     """
-    if not path.is_file():
+    if not is_file(path):
         raise BadInput("--posterior", str(path), "name a file posterior.csv of `rigdda fit`")
     try:
         head, *rows = csv.reader(io.StringIO(read_text("--posterior", path), newline=""))

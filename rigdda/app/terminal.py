@@ -157,8 +157,8 @@ checks_option = click.option(
 def typed(*names: str) -> list[str]:
     """Return those of some parameters of the command whose options the user typed."""
     context = click.get_current_context()
-    typed = click.core.ParameterSource.COMMANDLINE
-    return [name for name in names if context.get_parameter_source(name) is typed]
+    command_line = click.core.ParameterSource.COMMANDLINE
+    return [name for name in names if context.get_parameter_source(name) is command_line]
 
 
 def counted(number: int, noun: str) -> str:

@@ -274,6 +274,7 @@ def folder_for(out: Path | None, name: str, *files: str) -> Path:
         was not written by the command that is running.
     """
     from rigdda import BadInput
+    from rigdda.agents.run_record import RECORD_FILE
 
     folder = Path("runs") / _part(name) if out is None else out
     try:
@@ -282,7 +283,7 @@ def folder_for(out: Path | None, name: str, *files: str) -> Path:
     except OSError as error:
         hint = f"name a folder that can be created and written into ({error.strerror})"
         raise BadInput("--out", str(folder), hint) from None
-    for file in (folder / name for name in files):
+    for file in (folder / name for name in (*files, RECORD_FILE)):
         if file.exists() and not (file.is_file() and os.access(file, os.W_OK)):
             hint = "this file cannot be overwritten: move it away or name another folder"
             raise BadInput("--out", str(file), hint)
@@ -368,7 +369,6 @@ def _recorded(folder: Path, site: Site | None, before: set[Stamp]) -> Iterator[N
     if context is None:  # a function that is called from Python has no command to record
         yield
         return
-    _check_record(folder)
     command, typed = str(context.info_name), context.find_root().obj or []
     record = RunRecord.begin(command, list(typed), context.params, site)
     known = read(folder)
@@ -384,23 +384,6 @@ def _recorded(folder: Path, site: Site | None, before: set[Stamp]) -> Iterator[N
     record.end(sorted(written | {name for name in earlier if (folder / name).exists()}))
     record.write(folder)
     context.call_on_close(lambda: _add_findings(record, folder, context))
-
-
-def _check_record(folder: Path) -> None:
-    """Check that the record can be written into a folder.
-
-    Raises
-    ------
-    BadInput
-        If a folder has its name.
-    """
-    from rigdda import BadInput
-    from rigdda.agents.run_record import RECORD_FILE
-
-    file = folder / RECORD_FILE
-    if file.is_dir():
-        hint = "this file cannot be overwritten: move it away or name another folder"
-        raise BadInput("--out", str(file), hint)
 
 
 def _earlier(known: dict[str, RunRecord], command: str) -> list[str]:

@@ -143,7 +143,6 @@ def design(
     another problem (problem.json) is refused.
     """
     from rigdda.agents.designers.store import PROBLEM_FILE, record_problem
-    from rigdda.agents.run_record import RECORD_FILE
     from rigdda.app import design as job
     from rigdda.app.reports import design_report as report
     from rigdda.app.uncertainty.parameters import read_posterior
@@ -159,7 +158,6 @@ def design(
         *report.DESIGN_FILES,
         *report.BAND_FILES,
         PROBLEM_FILE,
-        RECORD_FILE,
     )
     record_problem(folder, problem, *report.DESIGN_FILES)
     with recorded_run(folder, problem.site):

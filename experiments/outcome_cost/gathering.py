@@ -30,7 +30,7 @@ FEWEST = 3
 SURE = 3.5
 """Standard errors by which a bias must exceed 3 % for its setting to be dropped."""
 
-DEAR = 2.0
+MOST_COST = 2.0
 """Processor time per release over that of this core's cheapest setting above which a peer's setting
 is dropped; it then counts with its lower bound."""
 
@@ -98,7 +98,7 @@ def surely_biased(sample: Sample, reference: Sample) -> bool:
 def followed(samples: dict[Setting, Sample]) -> list[Setting]:
     """Return the settings to be continued: this core's, and peers' that may be the cheapest."""
     reference = samples[REFERENCE]
-    cheap = DEAR * min(s.cpu for setting, s in samples.items() if setting.engine == CORE)
+    cheap = MOST_COST * min(s.cpu for setting, s in samples.items() if setting.engine == CORE)
     return [
         setting
         for setting, sample in samples.items()

@@ -319,7 +319,7 @@ def test_a_killed_simulation_goes_on_and_ends_the_same(tmp_path: Path) -> None:
     [
         (("--station", 400), ("station", "400", "between -15 and 61")),
         (("--station", 61), ("station", "61", "between -15 and 61")),
-        (("--station", "nan"), ("station", "nan", "between -15 and 61")),
+        (("--station", "nan"), ("--station", "nan", "give a finite number")),
         (("--station", "near"), ("--station", "near")),
         (("--releases", 0), ("--releases", "0", "1")),
         (("--model", "lumped", "--station", 3), ("--station", "blocks")),

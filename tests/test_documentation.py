@@ -34,7 +34,7 @@ BLOCK = re.compile(r"^(?:```|~~~)(\S*)[^\n]*\n(.*?)^(?:```|~~~)$", re.MULTILINE 
 SAVED = re.compile(r"[Ss]ave\s+(?:this|the\s+result)\s+as\s+`([\w.-]+)`")
 
 SMALL = {
-    "design": ["--budget", "60", "--verify", "20", "--ground-samples", "0"],
+    "design": ["--budget", "60", "--verify", "20", "--ground-samples", "1"],
     "corridor": ["--releases", "200"],
     "exam": ["--sites", "1", "--budget", "20", "--verify", "10"],
     "dataset": ["--sites", "2", "--layouts", "4", "--releases", "10"],

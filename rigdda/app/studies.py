@@ -180,7 +180,7 @@ def run(study: Study, seed: int, path: Path, tick: Tick) -> int:
     Raises
     ------
     BadInput
-        If the file is not the table of a study, or has only releases of another study.
+        If the file is not the table of a study.
     Diverged
         If a simulation diverges.
     """
@@ -189,10 +189,6 @@ def run(study: Study, seed: int, path: Path, tick: Tick) -> int:
     found = {row["key"]: row for row in _read(path, fields)}
     rows = {key: row for key, row in found.items() if key in jobs and _sound(row, study, jobs[key])}
     known = len(rows)
-    if found and not found.keys() & jobs.keys():
-        hint = "it has only releases of another study, seed or version: move it away or name "
-        hint += "another folder with --out"
-        raise BadInput("study table", str(path), hint)
     write_rows(path, list(rows.values()), fields)
     todo = [(key, job) for key, job in jobs.items() if key not in rows]
     with path.open("a", newline="", encoding="utf-8") as file:

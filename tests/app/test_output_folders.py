@@ -63,3 +63,16 @@ def test_an_input_in_the_results_folder_is_not_overwritten(folder: Path) -> None
     )  # fmt: skip
     assert "site.toml" in line and "not a result of `rigdda fit`: name another folder" in line
     assert (folder / "site.toml").read_bytes() == before
+
+
+def test_another_study_does_not_replace_the_results_of_the_first(folder: Path) -> None:
+    study = 'site = "site.toml"\nreleases = 1\n[[layouts]]\nname = "ditch"\nfile = "layout.toml"\n'
+    for name in ("a.toml", "b.toml"):
+        (folder / name).write_text(study, encoding="utf-8")
+    run("study", "a.toml", "--out", "results", folder=folder)
+    before = (folder / "results/study.csv").read_bytes()
+    line = refused("study", "b.toml", "--out", "results", folder=folder)
+    assert "it has the results of the study a.toml: name another folder" in line
+    assert (folder / "results/study.csv").read_bytes() == before
+    (folder / "a.toml").write_text(study.replace("ditch", "pit"), encoding="utf-8")
+    run("study", "a.toml", "--out", "results", folder=folder)

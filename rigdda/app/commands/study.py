@@ -47,6 +47,8 @@ def study(file: str, seed: int, worst: int, out: Path | None) -> None:
     """
     from dataclasses import replace
 
+    from rigdda import BadInput
+    from rigdda.agents import run_record
     from rigdda.app import studies, worst_releases
     from rigdda.app.released import released
     from rigdda.app.reports import findings, study_report
@@ -54,6 +56,10 @@ def study(file: str, seed: int, worst: int, out: Path | None) -> None:
     asked = studies.load(file)
     asked = replace(asked, site=released(asked.site))
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.STUDY_FILES)
+    earlier = run_record.read(folder).get("study")
+    if earlier is not None and Path(earlier.options["file"]) != Path(file):
+        hint = f"it has the results of the study {earlier.options['file']}: name another folder"
+        raise BadInput("--out", str(folder), hint)
     with recorded_run(folder, asked.site), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
         tick(asked.size, "tables and pictures")

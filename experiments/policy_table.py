@@ -61,11 +61,11 @@ def study(problem: DesignProblem, releases: int) -> list[dict[str, Any]]:
     """Return the rows of a site."""
     say(problem.site.name)
     store, found = Store(), []
-    forecast = forecasts.of_site(problem, policy.load().layouts)
+    own = forecasts.of_site(problem, policy.load().layouts)
     nothing = problem.nothing.objective
     for name, layout in layouts(problem).items():
         e = verify(problem, layout, releases, FRESH, store)
-        z = nothing * forecast.z[forecast.layouts.index(layout)] if name == LEAST else ""
+        z = nothing * float(np.nanmin(own.z)) if name == LEAST else ""
         found.append({
             "site": problem.site.name, "method": name, "z": e.objective, "z_low": e.ci[0],
             "z_high": e.ci[1], "z_forecast": z, "z_nothing": nothing, "releases": releases,

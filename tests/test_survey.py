@@ -343,10 +343,24 @@ def test_what_could_be_read_in_two_ways_is_refused(text, part):
     ],
 )
 def test_a_number_too_many_in_some_rows_is_refused(text, line, row):
-    with pytest.raises(BadInput, match=r"same number of cells.*semicolons") as caught:
+    with pytest.raises(BadInput, match="same number of cells") as caught:
         parse_table("survey.csv", text)
+    assert ("semicolons" in caught.value.hint) == ("," in text)
     assert caught.value.field == f"survey.csv line {line}"
     assert caught.value.value == row
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0 92\n10 90 rock 5 m\n120 3\n160 0\n",
+        "x,y,remark,code\n0,92\n10,90,,7\n120,3\n160,0\n",
+        "x,y,code,remark\n0,92,7\n10,90,8,edge\n120,3,7\n160,0,7\n",
+    ],
+)
+def test_numbers_of_remarks_are_no_part_of_the_profile(text):
+    points = parse_table("survey.csv", text).points
+    assert points.tolist() == [[0.0, 92.0], [10.0, 90.0], [120.0, 3.0], [160.0, 0.0]]
 
 
 def test_tables_with_a_stated_separator_and_with_stations():

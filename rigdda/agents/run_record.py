@@ -93,7 +93,7 @@ def read(folder: Path) -> dict[str, RunRecord]:
     try:
         return msgspec.json.decode(file.read_bytes(), type=dict[str, RunRecord])
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        hint = f"remove this file, then repeat the command that wrote the folder ({error})"
+        hint = f"this file is damaged: name another folder ({error})"
         raise BadInput("RESULTS", str(file), hint) from None
 
 

@@ -81,7 +81,7 @@ def _bad_path(error: OSError) -> str:
 
     if error.filename is None:
         return str(error)
-    hint = f"name a file or folder that can be used here ({error.strerror})"
+    hint = f"name a file or folder that exists and that you may read or write ({error.strerror})"
     return str(BadInput("path", error.filename, hint))
 
 

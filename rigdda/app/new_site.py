@@ -154,6 +154,10 @@ def compose(name: str, file: Path, request: SiteRequest) -> tuple[str, Profile]:
     return text, profile
 
 
+NEAR = 0.01
+"""Distance beyond the end of the profile within which a stretch of ground counts as ending at it
+[m]; chainages are often rounded."""
+
 LONGEST_NAME = 200
 """Greatest length of the name of a site of which a file has the name [bytes]; operating systems
 allow 255 with the ending."""
@@ -576,7 +580,7 @@ class _Draft:
     def _check_on_profile(self, text: str, span: Span) -> None:
         """Check that a stretch of ground lies on the profile."""
         ends = float(self.x[0]), float(self.x[-1])
-        if not ends[0] <= span[0] < span[1] <= ends[1]:
+        if not ends[0] - NEAR <= span[0] < span[1] <= ends[1] + NEAR:
             first, last = sorted(map(self.profile.origin.chainage_of, ends))
             hint = f"put it on the profile, chainage {first:.10g} to {last:.10g} of the survey"
             raise BadInput("--ground", text, hint)

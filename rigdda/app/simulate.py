@@ -13,7 +13,7 @@ import numpy as np
 
 import rigdda
 from rigdda import MECHANICS, Layout, Outcome, Run, Site
-from rigdda.app.unfinished import PARTS
+from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs.envelope import largest
 from rigdda.envs.outcome_cache import fingerprint
 from rigdda.files import atomic
@@ -71,7 +71,7 @@ def simulate(
     resumed = 0
     for start in range(0, len(seeds), chunk):
         part = seeds[start : start + chunk]
-        file = out / PARTS / f"{key}-{part[0]}-{len(part)}.npz"
+        file = out / UNFINISHED / f"{key}-{part[0]}-{len(part)}.npz"
         known = _read_part(file, part)
         if known is None:
             own = rigdda.release_many([(site, layout, seed, event) for seed in part])

@@ -315,7 +315,8 @@ def _refuse_foreign(folder: Path, files: Sequence[str]) -> None:
         if writer is not None:
             hint = f"`rigdda {writer}` wrote this file: name another folder"
         elif own is None and (folder / file).exists():
-            hint = f"this file is not a result of `rigdda {command}`: name another folder"
+            hint = f"run.json does not say that `rigdda {command}` wrote this file: move it away "
+            hint += "or name another folder"
         else:
             continue
         raise BadInput("--out", str(folder / file), hint)
@@ -369,10 +370,10 @@ def _recorded(folder: Path, site: Site | None, before: set[Stamp]) -> Iterator[N
     if context is None:  # a function that is called from Python has no command to record
         yield
         return
-    command, typed = str(context.info_name), context.find_root().obj or []
-    record = RunRecord.begin(command, list(typed), context.params, site)
+    command, arguments = str(context.info_name), context.find_root().obj or []
+    record = RunRecord.begin(command, list(arguments), context.params, site)
     known = read(folder)
-    earlier = _earlier(known, command)
+    record.files = earlier = _earlier(known, command)
     record.write(folder)
     try:
         yield

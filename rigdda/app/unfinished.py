@@ -8,10 +8,10 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-PARTS = ".unfinished"
+UNFINISHED = ".unfinished"
 """Name of the folder in the results folder of the job."""
 
 
-def forget(out: Path) -> None:
+def remove_unfinished(out: Path) -> None:
     """Remove the folder of a job whose tables are written."""
-    shutil.rmtree(out / PARTS, ignore_errors=True)
+    shutil.rmtree(out / UNFINISHED, ignore_errors=True)

@@ -408,23 +408,23 @@ def _check_lengths(
     body: Sequence[tuple[int, list[str]]],
     columns: Sequence[tuple[str, int]],
 ) -> None:
-    """Check that rows of different lengths differ only in texts, such as remarks.
+    """Check that no row has a number too many, which is often the part after a decimal comma.
 
-    A number too many in some of the rows is often the part after a decimal comma.
+    Such a row is longer than others and has a number next to the last column, or is longer than the
+    header and has a number anywhere beyond that column. Other numbers may belong to remarks.
     """
-    lengths = {len(cells) for cells in ([head] if head else []) + [cells for _, cells in body]}
-    if len(lengths) == 1:
-        return
     last = max(at for _, at in columns)
-    usual = len(head) or min(lengths)
-    further = [row for row in body if any(map(_looks_numeric, row[1][last + 1 :]))]
-    if further:
-        line, cells = min(further, key=lambda row: len(row[1]) == usual)
-        hint = (
-            "give every row the same number of cells, also where the last ones are empty; with "
-            "decimal commas separate columns by semicolons"
-        )
-        raise BadInput(f"{name} line {line}", (separator or " ").join(cells), hint)
+    shortest = min(len(cells) for cells in [*([head] if head else []), *(row for _, row in body)])
+    for line, cells in body:
+        beyond = [_looks_numeric(cell) for cell in cells[last + 1 :]]
+        next_to_last = beyond[:1] == [True] and len(cells) > shortest
+        if head:
+            next_to_last = next_to_last and shortest <= last + 1
+        if next_to_last or (head and len(cells) > len(head) and any(beyond)):
+            hint = "give every row the same number of cells, also where the last ones are empty"
+            if separator == ",":
+                hint += "; with decimal commas, separate columns by semicolons"
+            raise BadInput(f"{name} line {line}", (separator or " ").join(cells), hint)
 
 
 def _number(name: str, line: int, cells: Sequence[str], what: str, at: int) -> float:

@@ -64,6 +64,9 @@ USUAL_VULNERABILITY = ((1.0, 0.3), (10.0, 1.0))
 Australian Geomechanics Society (2007) for a vehicle that is damaged only (0 to 0.3) and for one
 that is buried or crushed (0.9 to 1). The volumes are an assumption."""
 
+DEFAULT_TRIPS = 500.0
+"""Default number of trips of a commuter [1/year]."""
+
 RUNS_INTO = 0.1
 """Default vulnerability in a vehicle that runs into debris [-]. It lies in the range from 0 to 0.3
 of the Australian Geomechanics Society (2007) for a vehicle that is damaged only. It is below the
@@ -174,12 +177,12 @@ class Traffic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         float,
         about(
             "Number of times per year that one person travels the section, for the individual "
-            "risk. It is at most that of all vehicles.",
+            "risk. At most the number of trips of all vehicles in a year.",
             "1/year",
             ge=0.0,
             le=1e5,
         ),
-    ] = 500.0
+    ] = DEFAULT_TRIPS
     fatality_value: Annotated[
         Value | None,
         about(
@@ -200,7 +203,7 @@ class Traffic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             hint = (
                 f"give at most {most:g}, the passages in a year of all vehicles with a person in "
                 f"them: vehicles_per_day is {self.vehicles_per_day:g} and occupancy "
-                f"{self.occupancy:g}"
+                f"{self.occupancy:g}; {DEFAULT_TRIPS:g} is the value if the key is left out"
             )
             raise BadInput("traffic.commuter_trips", self.commuter_trips, hint)
         if self.vulnerability is None:

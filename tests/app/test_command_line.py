@@ -316,12 +316,12 @@ def test_a_quick_look_with_points(tmp_path: Path) -> None:
     assert len({row["seed"] for row in rows(tmp_path / "o/points.csv")}) == 20
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_the_seed_of_every_command_has_a_limit(command: str) -> None:
-    for option in cli.cli.commands[command].params:
-        if option.name == "seed":
-            assert isinstance(option.type, WholeNumber)
-            assert option.type.max is not None and option.type.max < 2**64
+def test_the_seed_of_every_command_has_a_limit() -> None:
+    options = [o for name in COMMANDS for o in cli.cli.commands[name].params if o.name == "seed"]
+    assert len(options) >= 10
+    for option in options:
+        assert isinstance(option.type, WholeNumber)
+        assert option.type.max is not None and option.type.max < 2**64
 
 
 def test_the_largest_seed_is_in_the_tables(toml: Path, tmp_path: Path) -> None:

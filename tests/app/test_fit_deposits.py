@@ -15,7 +15,7 @@ from rigdda.app.uncertainty import fit
 from rigdda.app.uncertainty.observations import DEPOSIT, OBSERVED_RUN_OUT, DataSet, read
 from rigdda.app.uncertainty.parameters import parse, read_posterior, with_values
 from rigdda.app.uncertainty.score_surface import best_places
-from rigdda.app.unfinished import PARTS
+from rigdda.app.unfinished import UNFINISHED
 from rigdda.passages import passages
 
 SITE = Site.load("quick")
@@ -225,7 +225,7 @@ def test_a_killed_fit_goes_on_and_its_posterior_is_sampled(tmp_path: Path) -> No
     run(*command, "whole", folder=tmp_path)
     killed = rig(*command, "killed", folder=tmp_path)
     least = random.Random(3).randint(1, 9)
-    while len(list((tmp_path / "killed" / PARTS).glob("[!.]*.npz"))) < least:
+    while len(list((tmp_path / "killed" / UNFINISHED).glob("[!.]*.npz"))) < least:
         assert killed.poll() is None
         time.sleep(0.002)
     killed.kill()
@@ -233,7 +233,7 @@ def test_a_killed_fit_goes_on_and_its_posterior_is_sampled(tmp_path: Path) -> No
     run(*command, "killed", folder=tmp_path)
     for name in ("fit.csv", "posterior.csv", "site.toml"):
         assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
-    assert not (tmp_path / "killed" / PARTS).exists()
+    assert not (tmp_path / "killed" / UNFINISHED).exists()
     file = tmp_path / "whole/posterior.csv"
     joint = read_posterior(file, SITE)
     row = rows(tmp_path / "whole/fit.csv")[0]

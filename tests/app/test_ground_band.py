@@ -16,7 +16,7 @@ from rigdda.app.reports.wording import span
 from rigdda.app.uncertainty.ground_band import BandLayout, GroundSample, inputs
 from rigdda.app.uncertainty.parameters import Posterior, set_numbers
 from rigdda.app.uncertainty.varied_sites import Priced
-from rigdda.app.unfinished import PARTS
+from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs.cost import judge
 
 COMMAND = ("design", "narrow", "--budget", 300, "--verify", 40, "--seed", 2)
@@ -82,7 +82,7 @@ def test_a_killed_band_goes_on(designed: tuple[Path, str]) -> None:
     folder, _ = designed
     options = (*COMMAND, "--target", 0.2, "--ground-samples", 3, "--out", "killed")
     killed = rig(*options, folder=folder)
-    while not list((folder / "killed" / PARTS).glob("[!.]*.z")):
+    while not list((folder / "killed" / UNFINISHED).glob("[!.]*.z")):
         assert killed.poll() is None
         time.sleep(0.01)
     killed.kill()
@@ -90,7 +90,7 @@ def test_a_killed_band_goes_on(designed: tuple[Path, str]) -> None:
     run(*options, folder=folder)
     one, other = (folder / name / "band.csv" for name in ("killed", "whole"))
     assert one.read_bytes() == other.read_bytes()
-    assert not (folder / "killed" / PARTS).exists()
+    assert not (folder / "killed" / UNFINISHED).exists()
 
 
 def test_a_posterior_replaces_its_numbers() -> None:

@@ -8,6 +8,7 @@ import pytest
 from processes import refused, run
 
 from rigdda import Site
+from rigdda.agents import run_record
 
 LAYOUT = """[[barriers]]
 kind = "ditch"
@@ -41,6 +42,23 @@ def test_a_command_may_be_repeated_in_its_folder(folder: Path) -> None:
     simulate(folder, "results", "--layout", "layout.toml")
 
 
+def test_an_interrupted_command_may_be_repeated_and_keeps_its_files(folder: Path) -> None:
+    simulate(folder, "results")
+    record = run_record.read(folder / "results")
+    files = record["simulate"].files
+    record["simulate"].files = []  # as at the start of the first run of a command
+    run_record.write_records(folder / "results", record)
+    simulate(folder, "results")
+    assert set(files) <= {*run_record.read(folder / "results")["simulate"].files, "run.npz"}
+
+
+def test_files_without_a_record_are_not_overwritten(folder: Path) -> None:
+    simulate(folder, "results")
+    (folder / "results/run.json").unlink()
+    line = refused("simulate", "site.toml", "--releases", 1, "--out", "results", folder=folder)
+    assert "run.json does not say that `rigdda simulate` wrote this file: move it away" in line
+
+
 def test_results_of_another_command_are_not_overwritten(folder: Path) -> None:
     simulate(folder, "results")
     before = (folder / "results/section.png").read_bytes()
@@ -61,7 +79,7 @@ def test_an_input_in_the_results_folder_is_not_overwritten(folder: Path) -> None
         "fit", "site.toml", "seen.csv", "--parameters", "surfaces.rock.friction_deg=25:45",
         "--out", ".", folder=folder,
     )  # fmt: skip
-    assert "site.toml" in line and "not a result of `rigdda fit`: name another folder" in line
+    assert "site.toml" in line and "does not say that `rigdda fit` wrote this file" in line
     assert (folder / "site.toml").read_bytes() == before
 
 
@@ -75,4 +93,4 @@ def test_another_study_does_not_replace_the_results_of_the_first(folder: Path) -
     assert "it has the results of the study a.toml: name another folder" in line
     assert (folder / "results/study.csv").read_bytes() == before
     (folder / "a.toml").write_text(study.replace("ditch", "pit"), encoding="utf-8")
-    run("study", "a.toml", "--out", "results", folder=folder)
+    run("study", folder / "a.toml", "--out", folder / "results", folder=folder)

@@ -23,7 +23,7 @@ from rigdda.app.uncertainty.parameters import (
 )
 from rigdda.app.uncertainty.sensitivity import Response, analyse, of_function, places, plan
 from rigdda.app.uncertainty.sensitivity import run as analyse_site
-from rigdda.app.unfinished import PARTS
+from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs.cost import judge
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model import site_names
@@ -297,7 +297,7 @@ def test_a_killed_analysis_goes_on_and_ends_the_same(analysed: tuple[Path, str])
     dice, out = random.Random(5), folder / "killed"
     for least in sorted(dice.sample(range(1, 13), 2)):
         killed = rig(*COMMAND, "--seed", 3, "--out", "killed", folder=folder)
-        while len(list((out / PARTS).glob("[!.]*.z"))) < least:
+        while len(list((out / UNFINISHED).glob("[!.]*.z"))) < least:
             assert killed.poll() is None
             time.sleep(0.002)
         time.sleep(0.02 * dice.random())
@@ -307,4 +307,4 @@ def test_a_killed_analysis_goes_on_and_ends_the_same(analysed: tuple[Path, str])
     assert "from an interrupted run" in words
     for file in ("sensitivity.csv", "samples.csv"):
         assert (out / file).read_bytes() == (folder / "whole" / file).read_bytes()
-    assert not (out / PARTS).exists()
+    assert not (out / UNFINISHED).exists()

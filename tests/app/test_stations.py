@@ -18,7 +18,7 @@ from rigdda import Fence, Site
 from rigdda.app.reports import stations
 from rigdda.app.reports.simulation_report import TABLES
 from rigdda.app.reports.stations import QUANTILE_LEVELS, QUANTITIES, Passing
-from rigdda.app.unfinished import PARTS
+from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs.intervals import mid_p
 from rigdda.envs.quantiles import quantiles
 from rigdda.passages import PASSAGE, STATES, STOP, Passages, passages
@@ -162,7 +162,7 @@ def test_pictures_are_there_and_the_printed_figures_are_those_of_the_table(
     assert f"at 8 m {row['n']} blocks pass" in words
     (line,) = re_lines(words.split("at 8 m ")[1], "velocity [m/s]")
     assert f"{float(row['q50']):.3g}" in line and f"{float(row['q95']):.3g}" in line
-    assert not (folder / PARTS).exists()
+    assert not (folder / UNFINISHED).exists()
 
 
 def re_lines(text: str, word: str) -> list[str]:
@@ -303,7 +303,7 @@ def test_a_killed_simulation_goes_on_and_ends_the_same(tmp_path: Path) -> None:
     run("simulate", "verge", *options, "whole", folder=tmp_path)
     for least in (1, 4, 9):
         killed = rig("simulate", "verge", *options, "killed", folder=tmp_path)
-        while len(list((out / PARTS).glob("[!.]*.npz"))) < least:
+        while len(list((out / UNFINISHED).glob("[!.]*.npz"))) < least:
             assert killed.poll() is None
             time.sleep(0.01)
         killed.kill()

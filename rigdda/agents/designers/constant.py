@@ -1,7 +1,8 @@
-"""The best constant layout: one barrier of the same type and relative place on every site.
+"""The constant layout: the first barrier of a fixed list that fits into the barrier zone of a site.
 
-It uses no information on a site except the barrier zone. It is the baseline that a designer has to
-improve on.
+The list has one barrier of each kind with fixed sizes and a fixed relative place; if none may be
+built, the layout is mesh. The designer uses no other information on a site. It is the baseline that
+a designer has to improve on.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from rigdda.app.terminal import (
     show_risks,
     warn_of_placeholders,
 )
-from rigdda.app.unfinished import forget
+from rigdda.app.unfinished import remove_unfinished
 
 if TYPE_CHECKING:
     from rigdda.agents.designers.store import Store
@@ -152,15 +152,10 @@ def design(
         raise click.UsageError(f"{words}--ground-samples above 0")
     problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone, checks)
     fitted = None if posterior is None else read_posterior(posterior, problem.site)
-    folder = folder_for(
-        out,
-        f"design-{problem.site.name}",
-        *report.DESIGN_FILES,
-        *report.BAND_FILES,
-        PROBLEM_FILE,
-    )
-    record_problem(folder, problem, *report.DESIGN_FILES)
+    files = *report.DESIGN_FILES, *report.BAND_FILES, PROBLEM_FILE
+    folder = folder_for(out, f"design-{problem.site.name}", *files)
     with recorded_run(folder, problem.site):
+        record_problem(folder, problem, *report.DESIGN_FILES)
         total = job.search_budget(problem, designer, budget) + CASES * verify
         with interim(total) as (tick, show_interim):
             done, store = job.design(
@@ -212,7 +207,7 @@ def _on_other_grounds(
     with progress(grounds) as tick:
         band = ground_band.assess(done, grounds, fitted, seed, folder, tick)
     report.write_band(folder, band)
-    forget(folder)
+    remove_unfinished(folder)
     return band
 
 

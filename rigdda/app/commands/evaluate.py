@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -21,9 +20,6 @@ from rigdda.app.terminal import (
     show,
 )
 from rigdda.model.site_names import SPLITS
-
-if TYPE_CHECKING:
-    pass
 
 
 @click.command()

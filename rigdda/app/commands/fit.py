@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
 
@@ -18,10 +18,7 @@ from rigdda.app.terminal import (
     seed_option,
     show,
 )
-from rigdda.app.unfinished import forget
-
-if TYPE_CHECKING:
-    pass
+from rigdda.app.unfinished import remove_unfinished
 
 
 @click.command()
@@ -76,6 +73,6 @@ def fit(
         job.write(folder / "fit.csv", found)
         job.draw(folder / "fit.png", found)
         tables.write_rows(folder / "posterior.csv", found.posterior.rows())
-        forget(folder)
+        remove_unfinished(folder)
     show(tables.fit(job.rows(found, found.observed)))
     click.echo(f"up to {budget} parameter sets; {', '.join(files)} are in {folder}")

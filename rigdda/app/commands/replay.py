@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -17,9 +16,6 @@ from rigdda.app.terminal import (
     recorded_run,
     seed_option,
 )
-
-if TYPE_CHECKING:
-    pass
 
 
 @click.command()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -16,9 +15,6 @@ from rigdda.app.terminal import (
     show,
     show_risks,
 )
-
-if TYPE_CHECKING:
-    pass
 
 
 @click.command()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
 
@@ -23,10 +23,7 @@ from rigdda.app.terminal import (
     seed_option,
     show,
 )
-from rigdda.app.unfinished import forget
-
-if TYPE_CHECKING:
-    pass
+from rigdda.app.unfinished import remove_unfinished
 
 
 @click.command()
@@ -81,7 +78,7 @@ def sensitivity(
         found = job.run(asked, folder, tick)
         tick(asked.size, "tables and picture")
         sensitivity_report.write(folder, found)
-        forget(folder)
+        remove_unfinished(folder)
     for line, table in sensitivity_report.tables(found):
         click.echo(line)
         show(table)

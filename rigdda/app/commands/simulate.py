@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -22,10 +21,7 @@ from rigdda.app.terminal import (
     show,
     warn_of_placeholders,
 )
-from rigdda.app.unfinished import forget
-
-if TYPE_CHECKING:
-    pass
+from rigdda.app.unfinished import remove_unfinished
 
 
 @click.command()
@@ -102,7 +98,7 @@ def simulate(
         found.run.save(folder / "run.npz")
         passing = Passing.of(where, barriers, event, found.passages)
         rows, rest = simulation_report.write(folder, passing, barriers, asked)
-        forget(folder)
+        remove_unfinished(folder)
     show(tables.outcomes(where, barriers, found.outcomes, stations.stopped(rest)))
     for line, table in stations.tables(rows):
         click.echo(line)

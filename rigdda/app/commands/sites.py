@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
 from rigdda.app.terminal import (
     show,
 )
-
-if TYPE_CHECKING:
-    pass
 
 
 @click.command()

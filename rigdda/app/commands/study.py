@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -20,9 +19,6 @@ from rigdda.app.terminal import (
     seed_option,
     show,
 )
-
-if TYPE_CHECKING:
-    pass
 
 
 @click.command()
@@ -47,8 +43,6 @@ def study(file: str, seed: int, worst: int, out: Path | None) -> None:
     """
     from dataclasses import replace
 
-    from rigdda import BadInput
-    from rigdda.agents import run_record
     from rigdda.app import studies, worst_releases
     from rigdda.app.released import released
     from rigdda.app.reports import findings, study_report
@@ -56,10 +50,7 @@ def study(file: str, seed: int, worst: int, out: Path | None) -> None:
     asked = studies.load(file)
     asked = replace(asked, site=released(asked.site))
     folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.STUDY_FILES)
-    earlier = run_record.read(folder).get("study")
-    if earlier is not None and Path(earlier.options["file"]) != Path(file):
-        hint = f"it has the results of the study {earlier.options['file']}: name another folder"
-        raise BadInput("--out", str(folder), hint)
+    _check_same_study(folder, file)
     with recorded_run(folder, asked.site), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
         tick(asked.size, "tables and pictures")
@@ -86,3 +77,22 @@ def study(file: str, seed: int, worst: int, out: Path | None) -> None:
             note(f"the layout {name!r} {words}")
     words = f", {resumed} from an earlier run" if resumed else ""
     click.echo(f"{asked.size:,} releases{words}; tables and pictures are in {folder}")
+
+
+def _check_same_study(folder: Path, file: str) -> None:
+    """Check that a folder has no results of a study file of another name.
+
+    The path may differ, because folders are moved.
+
+    Raises
+    ------
+    BadInput
+        If the study file had another name.
+    """
+    from rigdda import BadInput
+    from rigdda.agents.run_record import read
+
+    earlier = read(folder).get("study")
+    if earlier is not None and Path(earlier.options["file"]).name != Path(file).name:
+        hint = f"it has the results of the study {earlier.options['file']}: name another folder"
+        raise BadInput("--out", str(folder), hint)

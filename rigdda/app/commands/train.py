@@ -93,12 +93,12 @@ def _policy(
     from rigdda.envs import forecast_table
 
     terms = training.Terms(sites, algorithm, simulate, seed)
-    compared = training.comparison_sites(compare)
+    names = training.comparison_sites(compare)
     number = sites or len(forecast_table.load().rows("train"))
     folder = folder_for(out, "train", *training.FILES, COMPARISON)
     with recorded_run(folder), progress(max(number, compare, training.MEMBERS)) as tick:
         policy = training.train(terms, folder, tick)
-        rows = training.compare(policy, folder, terms, compared, verify, tick)
+        rows = training.compare(policy, folder, terms, names, verify, tick)
         if rows:
             tables.write_rows(folder / COMPARISON, [asdict(row) for row in rows])
     if rows:

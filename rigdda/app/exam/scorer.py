@@ -191,18 +191,13 @@ class Scorer:
         BadInput
             As `run` does.
         """
-        self._read_folder()
+        identity = identity_of(self.asked, self.functions)
+        self._read_folder(identity)
         for budget in self.asked.budgets:
-            self._play(budget)
+            self._play(budget, identity)
 
-    def _identity(self) -> dict[str, str]:
-        """Return what tells this run from others."""
-        code = [source_hash_of(option, name) for option, name in self.functions.items() if name]
-        own = [self.asked.specification.key, self.asked.seed, *self.functions.values(), *code]
-        return {"run": msgspec.json.encode([__version__, *own, MECHANICS]).decode()}
-
-    def _read_folder(self) -> None:
-        """Read what the folder has of this run.
+    def _read_folder(self, identity: dict[str, str]) -> None:
+        """Read what the folder has of the run with an identity.
 
         Raises
         ------
@@ -212,24 +207,19 @@ class Scorer:
         file, known = self.folder / IDENTITY, self.folder / SUBMISSIONS
         if not known.is_file():
             return
-        if file.is_file() and _decoded(file, dict[str, str]) != self._identity():
+        if file.is_file() and _decoded(file, dict[str, str]) != identity:
             hint = "it contains an exam of another entry, source file, seed or version: "
             hint += "name another folder"
             raise BadInput("--out", str(self.folder), hint)
         rows = _decoded(known, list[Submission])
         self._done = {(row.name, row.budget): row for row in rows}
 
-    def _mark_folder(self) -> None:
-        """Note to which run the folder belongs."""
-        with atomic(self.folder / IDENTITY) as fresh:
-            fresh.write_bytes(msgspec.json.encode(self._identity()))
-
     def _keep(self, submission: Submission) -> None:
         self._done[submission.name, submission.budget] = submission
         with atomic(self.folder / SUBMISSIONS) as fresh:
             fresh.write_bytes(msgspec.json.encode(list(self._done.values())))
 
-    def _play(self, budget: int) -> None:
+    def _play(self, budget: int, identity: dict[str, str]) -> None:
         """Let the entry work on all tasks with a budget that are not done."""
         orders = [o for o in self.asked.orders(budget) if (o.name, budget) not in self._done]
         if not orders:
@@ -238,7 +228,8 @@ class Scorer:
         played = []
         with _process(self.functions) as pipe:
             flags = _imported(pipe, self.functions)
-            self._mark_folder()
+            with atomic(self.folder / IDENTITY) as file:
+                file.write_bytes(msgspec.json.encode(identity))
             for order in orders:
                 for problem in problems_of(order):
                     self.tick(len(self._done), f"{order.name}: releases without barriers")
@@ -261,7 +252,9 @@ class Scorer:
         for reason in flags:
             counter.flag(reason)
         option = entrant.option_of(order, self.functions[CORRIDOR_ENTRY])
-        with _told(option, self.functions[option], f"on {order.name}: return a layout instead"):
+        with _errors_named(
+            option, self.functions[option], f"on {order.name}: return a layout instead"
+        ):
             pipe.send_bytes(encode(order))
             while True:
                 request = decode_request(pipe.recv_bytes())
@@ -373,8 +366,21 @@ def _decoded(file: Path, of: type[Any]) -> Any:
         raise BadInput("exam", str(file), hint) from None
 
 
+def identity_of(asked: ExamPart, functions: Functions) -> dict[str, str]:
+    """Return what distinguishes a run from others, also the source files of the functions.
+
+    Raises
+    ------
+    BadInput
+        If there is no module of a function.
+    """
+    code = [source_hash_of(option, name) for option, name in functions.items() if name]
+    own = [asked.specification.key, asked.seed, *functions.values(), *code]
+    return {"run": msgspec.json.encode([__version__, *own, MECHANICS]).decode()}
+
+
 def check_functions(functions: Functions) -> None:
-    """Check that functions can be imported, in a process as that of an exam.
+    """Check that functions can be imported, in a process like that of an exam.
 
     Raises
     ------
@@ -417,7 +423,8 @@ def _imported(pipe: Connection, functions: Functions) -> list[str]:
         If they cannot be imported.
     """
     flags: list[str] = []
-    with _told(SITE_ENTRY, functions[SITE_ENTRY], "while it was imported: correct the module"):
+    names = ", ".join(filter(None, functions.values()))
+    with _errors_named(SITE_ENTRY, names, "while it was imported: correct the module"):
         while not isinstance(request := decode_request(pipe.recv_bytes()), ReadyRequest):
             if not isinstance(request, FlagRequest):
                 raise _failure(request, functions)
@@ -434,7 +441,7 @@ def _failure(request: AnyRequest, functions: Functions) -> BadInput:
 
 
 @contextmanager
-def _told(option: Option, name: str, ended: str) -> Iterator[None]:
+def _errors_named(option: Option, name: str, ended: str) -> Iterator[None]:
     """Turn errors of the connection into errors that name a function.
 
     `ended` says when its process ended, and the remedy.

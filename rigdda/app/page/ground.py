@@ -293,6 +293,6 @@ def fit_rows(folder: Path) -> list[Row]:
 def tried(folder: Path) -> int:
     """Return how many parameter sets a fit that is running has computed."""
     with IMPORTING:
-        from rigdda.app.unfinished import PARTS
+        from rigdda.app.unfinished import UNFINISHED
 
-    return len(list((folder / PARTS).glob("*.npz")))
+    return len(list((folder / UNFINISHED).glob("*.npz")))

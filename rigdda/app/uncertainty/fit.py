@@ -40,7 +40,7 @@ from rigdda.app.uncertainty.observations import (
 )
 from rigdda.app.uncertainty.parameters import Parameter, Posterior, check_once, with_values
 from rigdda.app.uncertainty.score_surface import best_places
-from rigdda.app.unfinished import PARTS
+from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs.outcome_cache import fingerprint
 from rigdda.files import atomic
 from rigdda.lumped_mass import lumped
@@ -425,7 +425,9 @@ def fit(
 
     def compute(values: Floats, seeds: range) -> Mapping[str, Floats]:
         changed = with_values(site, parameters, list(values))
-        file = None if out is None else out / PARTS / f"{_key(changed, sets, model, seeds)}.npz"
+        file = (
+            None if out is None else out / UNFINISHED / f"{_key(changed, sets, model, seeds)}.npz"
+        )
         known = None if file is None else _read(file, sets)
         if known is None:
             known = computed(changed, sets, model, seeds)

@@ -38,6 +38,9 @@ Tick = Callable[[int, str], None]
 DEFAULT_GROUNDS = 6
 """Default number of grounds."""
 
+INVALID_GROUND = "give 0, or another --posterior: the site is invalid with the values of a ground"
+"""Remedy if a ground that was drawn makes the site invalid."""
+
 RELEASES_PER_GROUND = 120
 """Number of releases of each layout on each ground."""
 
@@ -195,7 +198,8 @@ def assess(
     for i, place in enumerate(cube):
         tick(i, f"ground {i + 1} of {grounds}")
         name = f"{problem.site.name}, ground {i + 1}"  # for warnings
-        site = msgspec.structs.replace(site_at(problem.site, asked, place), name=name)
+        ground = site_at(problem.site, asked, place, "--ground-samples", INVALID_GROUND)
+        site = msgspec.structs.replace(ground, name=name)
         found = simulate(site, layouts, seeds, out)
         pairs = zip(asked, place.tolist(), strict=True)
         values = {p: v for one, at in pairs for p, v in zip(one.paths, one.at(at), strict=True)}

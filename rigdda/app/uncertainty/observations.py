@@ -227,14 +227,14 @@ def _station(row: Row, site: Site) -> float:
     """
     station, (low, high) = _number(row, "station_m"), ends(site)
     if not low < station < high:
-        hint = f"give a chainage within the profile, between {low:g} and {high:g} m"
+        hint = f"give a chainage within the profile, between {chainage(low)} and {chainage(high)} m"
         raise BadInput(f"{row[0]} station_m", station, hint)
     event = row[1]["event"]
     source = site.source(site.event(event).source)
     first = min(source.band or [x for _, piece in source.pieces() for x, _ in piece])
     if station <= first:
-        hint = f"give a chainage beyond {first:g} m, where the source {source.name} begins: no "
-        hint += f"block of the event {event} passes a station uphill of it"
+        hint = f"give a chainage beyond {chainage(first)} m, where the source {source.name} "
+        hint += f"begins: no block of the event {event} passes a station uphill of it"
         raise BadInput(f"{row[0]} station_m", station, hint)
     return station
 

@@ -271,10 +271,15 @@ def check_limits(site: Site, parameters: Sequence[Parameter]) -> None:
     """
     for parameter in parameters:
         for value in (parameter.low, parameter.high):
-            _named(site, (parameter.path,), (value,), "choose a limit with which the site is valid")
+            _set_or_name(
+                site, (parameter.path,), (value,), "choose a limit with which the site is valid"
+            )
 
 
-def _named(site: Site, paths: Sequence[str], values: Sequence[float], remedy: str) -> Site:
+def _set_or_name(
+    site: Site, paths: Sequence[str], values: Sequence[float], remedy: str,
+    field: str = "--parameters",
+) -> Site:  # fmt: skip
     """Return a site with other values of some numbers, see `set_numbers`.
 
     Raises
@@ -289,7 +294,7 @@ def _named(site: Site, paths: Sequence[str], values: Sequence[float], remedy: st
         if bad.field == "--parameters":
             raise
         given = ", ".join(f"{p} = {v:g}" for p, v in zip(paths, values, strict=True))
-        raise BadInput("--parameters", given, f"{remedy} ({bad})") from None
+        raise BadInput(field, given, f"{remedy} ({bad})") from None
 
 
 def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[float]) -> Site:
@@ -482,17 +487,24 @@ Input = Parameter | Posterior
 """An input of a sensitivity analysis, with its `path`, `paths` and values `at` a place."""
 
 
-def site_at(site: Site, inputs: Sequence[Input], place: Floats) -> Site:
+def site_at(
+    site: Site,
+    inputs: Sequence[Input],
+    place: Floats,
+    field: str = "--parameters",
+    remedy: str = "choose narrower limits, with which the site is valid",
+) -> Site:
     """Return a site with the values of inputs at a place of the unit cube, (D,).
 
     Raises
     ------
     BadInput
-        If the site is invalid with these values together.
+        If the site is invalid with these values together. The error has this field and remedy, and
+        names the inputs.
     """
     paths = [path for one in inputs for path in one.paths]
     values = [v for one, at in zip(inputs, place.tolist(), strict=True) for v in one.at(at)]
-    return _named(site, paths, values, "choose narrower limits, with which the site is valid")
+    return _set_or_name(site, paths, values, remedy, field)
 
 
 def inputs(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import rigdda
 from rigdda import MECHANICS, Layout, Outcome, Site
-from rigdda.app.unfinished import PARTS
+from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs import outcome_cache
 from rigdda.envs.cost import account
 from rigdda.files import atomic
@@ -67,7 +67,7 @@ def simulate(
         for event, drawn in seeds.items()
         for seed in drawn
     ]
-    file = None if folder is None else folder / PARTS / f"{_key(site, layouts, seeds)}.z"
+    file = None if folder is None else folder / UNFINISHED / f"{_key(site, layouts, seeds)}.z"
     found = None if file is None else _read(file, len(jobs))
     resumed = found is not None
     if found is None:

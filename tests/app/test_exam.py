@@ -268,17 +268,18 @@ def test_only_a_folder_with_submissions_belongs_to_an_entry(
     monkeypatch.chdir(folder)
     asked = specification.part(specification.load(folder / "spec.toml"))
     known = specification.references(asked.specification, folder / "spec.toml")
-    first, second = (
+    broken, honest = (
         scorer.Scorer(asked, known, f"entries_of_test:{name}", "", tmp_path)
         for name in ("broken", "honest")
     )
-    first._mark_folder()
-    second._read_folder()  # the first entry failed before it submitted anything
-    second._mark_folder()
-    second._keep(scorer.Submission(SITES[0], 60, [[]], 0, 0, []))
-    second._read_folder()
+    first, second = (scorer.identity_of(asked, one.functions) for one in (broken, honest))
+    broken._mark_folder(first)
+    honest._read_folder(second)  # the first entry failed before it submitted anything
+    honest._mark_folder(second)
+    honest._keep(scorer.Submission(SITES[0], 60, [[]], 0, 0, []))
+    honest._read_folder(second)
     with pytest.raises(BadInput, match="an exam of another entry, source file"):
-        first._read_folder()
+        broken._read_folder(first)
 
 
 @pytest.mark.slow

@@ -214,6 +214,11 @@ class Scorer:
         rows = _decoded(known, list[Submission])
         self._done = {(row.name, row.budget): row for row in rows}
 
+    def _mark_folder(self, identity: dict[str, str]) -> None:
+        """Note to which run the folder belongs."""
+        with atomic(self.folder / IDENTITY) as fresh:
+            fresh.write_bytes(msgspec.json.encode(identity))
+
     def _keep(self, submission: Submission) -> None:
         self._done[submission.name, submission.budget] = submission
         with atomic(self.folder / SUBMISSIONS) as fresh:
@@ -228,8 +233,7 @@ class Scorer:
         played = []
         with _process(self.functions) as pipe:
             flags = _imported(pipe, self.functions)
-            with atomic(self.folder / IDENTITY) as file:
-                file.write_bytes(msgspec.json.encode(identity))
+            self._mark_folder(identity)
             for order in orders:
                 for problem in problems_of(order):
                     self.tick(len(self._done), f"{order.name}: releases without barriers")

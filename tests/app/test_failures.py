@@ -166,7 +166,10 @@ def test_a_path_that_cannot_be_used_is_named_with_its_remedy(
 
     monkeypatch.setattr(rigdda, "load_layout", fail)
     assert cli.main(["simulate", "chute.toml", "--layout", "x"]) == 2
-    said = "path = 'chute.toml/x': name a file or folder that exists and that you may read or write (Not a directory)"
+    said = (
+        "path = 'chute.toml/x': name a file or folder that exists and that you may read or write "
+    )
+    said += "(Not a directory)"
     assert capsys.readouterr().err == f"rigdda: {said}\n"
 
 

@@ -1,9 +1,10 @@
-"""File access: reading of UTF-8 text, and atomic writing."""
+"""File access: reading of UTF-8 text, atomic writing, and files of unfinished jobs."""
 
 from __future__ import annotations
 
 import errno
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -42,6 +43,10 @@ def is_folder(path: str | os.PathLike[str]) -> bool:
     return os.path.isdir(path)
 
 
+LONGEST_NAME = 200
+"""Greatest length of the name of a file or folder, without an ending [bytes]; operating systems
+allow 255."""
+
 PART = "part-"
 """Beginning of the suffix of a temporary file."""
 
@@ -55,6 +60,15 @@ def remove_parts(folder: Path) -> None:
     for part in (*folder.glob(name), *folder.glob(f"*/{name}")):
         with suppress(OSError):  # the file of another user does no harm
             part.unlink()
+
+
+UNFINISHED = ".unfinished"
+"""Name of the folder in a results folder from which a job that was killed continues."""
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove what a job kept in its results folder to continue; its tables are written."""
+    shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
 
 
 @contextmanager

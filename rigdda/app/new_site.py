@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rigdda import BadInput, Site
 from rigdda.app.value_origins import CHECK_DEFAULT, GIVEN, PLACEHOLDER, SURVEYED
 from rigdda.fields import described
-from rigdda.files import atomic
+from rigdda.files import LONGEST_NAME, atomic
 from rigdda.ground.barrier_zone import BarrierZone
 from rigdda.ground.grounds import GROUNDS, USUAL
 from rigdda.ground.prices import Consequences, Prices
@@ -157,10 +157,6 @@ def compose(name: str, file: Path, request: SiteRequest) -> tuple[str, Profile]:
 NEAR = 0.01
 """Distance beyond the end of the profile within which a stretch of ground counts as ending at it
 [m]; chainages are often rounded."""
-
-LONGEST_NAME = 200
-"""Greatest length of the name of a site of which a file has the name [bytes]; operating systems
-allow 255 with the ending."""
 
 
 def file_of(name: str, out: Path | None) -> Path:

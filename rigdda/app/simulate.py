@@ -13,10 +13,9 @@ import numpy as np
 
 import rigdda
 from rigdda import MECHANICS, Layout, Outcome, Run, Site
-from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs.envelope import largest
 from rigdda.envs.outcome_cache import fingerprint
-from rigdda.files import atomic
+from rigdda.files import UNFINISHED, atomic
 from rigdda.passages import Passages, passages
 
 Tick = Callable[[int, str], None]

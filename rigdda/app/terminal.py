@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from rigdda.agents.limits import JOB_RELEASES, RELEASE_SEED
+from rigdda.files import LONGEST_NAME
 
 if TYPE_CHECKING:
     from rigdda import Layout, Site
@@ -185,9 +186,6 @@ if TYPE_CHECKING:
 FORBIDDEN = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*]')
 """Characters that some operating systems do not allow in the name of a folder."""
 
-LONGEST_FOLDER_NAME = 200
-"""Greatest length of the name of a folder [bytes]; operating systems allow 255."""
-
 UNRECORDED = ("report",)
 """Commands that write into a results folder without a record in it."""
 
@@ -326,7 +324,7 @@ def _part(name: str) -> str:
     """Return a name, for example of a site, as a valid part of a path."""
     coding = sys.getfilesystemencoding()
     known = name.encode(coding, "replace").decode(coding)
-    return FORBIDDEN.sub("-", known).encode(coding)[:LONGEST_FOLDER_NAME].decode(coding, "ignore")
+    return FORBIDDEN.sub("-", known).encode(coding)[:LONGEST_NAME].decode(coding, "ignore")
 
 
 @contextmanager

@@ -29,6 +29,9 @@ Rows = NDArray[np.int64]
 SHIPPED = Path(__file__).parent / "forecasts.safetensors"
 """The table that ships with the package, made by `python -m experiments.known_forecasts`."""
 
+WIDE = "wide-"
+"""Beginning of the names of the splits with wide ranges and of their sites."""
+
 NAMES = tuple(sorted(FIELDS))
 """Arrays of the observation of a site in the order in which a table concatenates them."""
 
@@ -88,11 +91,12 @@ class ForecastTable:
         place = {name: row for row, name in enumerate(self.names)}
         split = "train" if site == "random" else site
         if isinstance(split, str) and split in sites.SPLITS:
-            part = split.removeprefix("wide-")
+            part = split.removeprefix(WIDE)
+            version = WIDE if split != part else ""  # beginning of the names of its sites
             found = [
                 row
                 for row, name in enumerate(self.names)
-                if sites.part_of(name) == part and name.startswith(split.removesuffix(part))
+                if sites.part_of(name) == part and name.startswith(version)
             ]
             if not found:
                 raise BadInput("site", site, "the table of forecasts has no site of this split")

@@ -243,7 +243,8 @@ def test_an_entry_that_cannot_be_imported_is_refused_before_anything_is_written(
     for name, text in ODD.items():
         (tmp_path / f"{name}.py").write_text(text)
     assert named in refused("exam", *options, "--out", "o", folder=tmp_path)
-    assert not (tmp_path / "o").exists() and not (tmp_path / "runs").exists()
+    assert not any(path.is_file() for path in (tmp_path / "o").rglob("*"))
+    assert not (tmp_path / "runs").exists()
 
 
 def test_the_process_of_an_entry_imports_it_before_anything_is_computed(

@@ -15,7 +15,7 @@ from rigdda.app.uncertainty import fit
 from rigdda.app.uncertainty.observations import DEPOSIT, OBSERVED_RUN_OUT, DataSet, read
 from rigdda.app.uncertainty.parameters import parse, read_posterior, with_values
 from rigdda.app.uncertainty.score_surface import best_places
-from rigdda.app.unfinished import UNFINISHED
+from rigdda.files import UNFINISHED
 from rigdda.passages import passages
 
 SITE = Site.load("quick")
@@ -89,8 +89,8 @@ def test_the_least_place_of_noisy_scores_is_found_with_its_error() -> None:
 
 @pytest.mark.slow
 def test_passages_and_run_outs_are_fitted_together(tmp_path: Path) -> None:
-    parameters = [parse("surfaces.rock.rolling")]
-    real = with_values(SITE, parameters, (0.25,))
+    parameters, rolling = [parse("surfaces.rock.rolling")], 0.25
+    real = with_values(SITE, parameters, (rolling,))
     found = passages(real, (), [(s, "block") for s in range(7000, 7040)], [20.0]).table
     lines = ["event,station_m,quantity,value"]
     lines += [f"block,20,velocity,{np.hypot(v, w)}" for v, w in found[["vx", "vy"]].tolist()]
@@ -109,7 +109,7 @@ def test_passages_and_run_outs_are_fitted_together(tmp_path: Path) -> None:
     assert sets["block, deposit"].shares == pytest.approx(one.shares)
     got = fit.fit(SITE, sets, parameters, 16, 40, 0, lambda done, words: None)
     low, high = got.posterior.interval(0.99)
-    assert low[0] <= 0.9 <= high[0] and high[0] - low[0] < 2.0
+    assert low[0] <= rolling <= high[0] and high[0] - low[0] < 0.3
     table = {row["what"]: row for row in fit.rows(got, got.observed)}
     for name in names:
         row = table[f"mean, {name}"]

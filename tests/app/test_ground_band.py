@@ -16,8 +16,8 @@ from rigdda.app.reports.wording import span
 from rigdda.app.uncertainty.ground_band import BandLayout, GroundSample, inputs
 from rigdda.app.uncertainty.parameters import Posterior, set_numbers
 from rigdda.app.uncertainty.varied_sites import Priced
-from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs.cost import judge
+from rigdda.files import UNFINISHED
 
 COMMAND = ("design", "narrow", "--budget", 300, "--verify", 40, "--seed", 2)
 NAMES = ["nothing", "rule", "constant", "optimised (race)"]

@@ -23,8 +23,8 @@ from rigdda.app.uncertainty.parameters import (
 )
 from rigdda.app.uncertainty.sensitivity import Response, analyse, of_function, places, plan
 from rigdda.app.uncertainty.sensitivity import run as analyse_site
-from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs.cost import judge
+from rigdda.files import UNFINISHED
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model import site_names
 from rigdda.model.site_tables import MOST_OFTEN

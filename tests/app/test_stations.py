@@ -18,9 +18,9 @@ from rigdda import Fence, Site
 from rigdda.app.reports import stations
 from rigdda.app.reports.simulation_report import TABLES
 from rigdda.app.reports.stations import QUANTILE_LEVELS, QUANTITIES, Passing
-from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs.intervals import mid_p
 from rigdda.envs.quantiles import quantiles
+from rigdda.files import UNFINISHED
 from rigdda.passages import PASSAGE, STATES, STOP, Passages, passages
 
 RELEASES = 120

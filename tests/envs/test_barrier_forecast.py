@@ -7,6 +7,7 @@ import subprocess
 import sys
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -100,6 +101,24 @@ def test_a_wide_split_has_the_sites_of_the_version_with_wide_ranges() -> None:
     both = replace(shipped, names=("random-0", *shipped.names[1:]))
     assert both.rows("train")[0] == 0
     assert (both.rows("wide-train") == both.rows("train")[1:]).all()
+
+
+def test_the_page_has_the_rewards_of_the_shipped_table() -> None:
+    page = Path(__file__).parents[2] / "docs/environments/BarrierForecast-v0.md"
+    table = forecast_table.load()
+    parts = [table.rows(part) for part in ("train", "validation", "test")]
+    best = table.reward[parts[0]].mean(axis=0).argmax()
+    uniform = [np.mean([table.reward[i][table.mask[i]].mean() for i in rows]) for rows in parts]
+    figures = {
+        "a random layout that can be built": uniform,
+        "on the training sites": [table.reward[rows, best].mean() for rows in parts],
+        "the upper bound": [table.reward[rows].max(axis=1).mean() for rows in parts],
+    }
+    text = page.read_text(encoding="utf-8")
+    for words, values in figures.items():
+        assert words + "".join(f" | {value:.2f}" for value in values) + " |" in text
+    for rows, part in zip(parts, ("training", "validation", "test"), strict=True):
+        assert f"{len(rows)} {part} sites" in text
 
 
 def test_a_table_of_narrow_sites_has_no_wide_split(table: ForecastTable) -> None:

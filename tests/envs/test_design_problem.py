@@ -299,14 +299,14 @@ def test_without_prices_the_reward_is_the_share_of_debris_kept_off() -> None:
 
 @pytest.mark.slow
 def test_the_cost_of_nothing_is_found_again_by_another_process(tmp_path: Path) -> None:
-    program = (
+    program = (  # on a site that is not in the store of the package
         "import warnings; from rigdda.envs import DesignProblem, ensemble, site_store\n"
         "warnings.simplefilter('ignore'); ensemble.FIRST_ROUND, ensemble.BOTH_ROUNDS = 2, 8\n"
         "where = site_store.path_of('ensemble', b'').parent\n"
-        "print(DesignProblem('verge').nothing.simulated, where.exists())\n"
+        "print(DesignProblem('random-5').nothing.simulated, where.exists())\n"
         "ensemble._simulate = None\n"
         "ensemble.memory = type(ensemble.memory)(4)\n"
-        "print(DesignProblem('verge', 2).nothing.objective)\n"
+        "print(DesignProblem('random-5', 2).nothing.objective)\n"
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True,
                          env={**os.environ, "XDG_CACHE_HOME": str(tmp_path)})  # fmt: skip

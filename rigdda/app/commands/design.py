@@ -28,7 +28,7 @@ from rigdda.app.terminal import (
     show_risks,
     warn_of_placeholders,
 )
-from rigdda.app.unfinished import remove_unfinished
+from rigdda.files import remove_unfinished
 
 if TYPE_CHECKING:
     from rigdda.agents.designers.store import Store

@@ -74,7 +74,7 @@ def exam(
     references = specification.references(asked, spec)
     part = specification.part(asked, sites, corridors, budgets, verify, seed)
     specification.check_references(part, references)
-    scorer.check_functions({"--entry": entry, "--corridor-entry": corridor_entry})
+    scorer.check_names({"--entry": entry, "--corridor-entry": corridor_entry})
     folder = folder_for(out, f"exam-{entry.rpartition(':')[2]}", *ranking.FILES)
     with recorded_run(folder), progress(part.size) as tick:
         job = scorer.Scorer(part, references, entry, corridor_entry, folder, tick)

@@ -23,7 +23,7 @@ from rigdda.app.terminal import (
     seed_option,
     show,
 )
-from rigdda.app.unfinished import remove_unfinished
+from rigdda.files import remove_unfinished
 
 
 @click.command()

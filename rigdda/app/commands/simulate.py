@@ -21,7 +21,7 @@ from rigdda.app.terminal import (
     show,
     warn_of_placeholders,
 )
-from rigdda.app.unfinished import remove_unfinished
+from rigdda.files import remove_unfinished
 
 
 @click.command()

@@ -97,12 +97,12 @@ class AskTell:
         All points are evaluated on the same releases. A layout that was evaluated before costs
         nothing. When the search is no longer `open`, the value of a new layout is infinite.
         """
-        layout, still = self.layout(point), self.open
-        self._points -= 1
+        layout = self.layout(point)
         if layout not in self._found:
-            if not still:
+            if not self.open:
                 return math.inf
             self._found[layout] = self.task.evaluate(layout, self.releases).objective
+        self._points -= 1
         return self._found[layout]
 
     def best(self) -> Layout:

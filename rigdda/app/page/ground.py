@@ -293,6 +293,6 @@ def fit_rows(folder: Path) -> list[Row]:
 def tried(folder: Path) -> int:
     """Return how many parameter sets a fit that is running has computed."""
     with IMPORTING:
-        from rigdda.app.unfinished import UNFINISHED
+        from rigdda.files import UNFINISHED
 
     return len(list((folder / UNFINISHED).glob("*.npz")))

@@ -40,9 +40,8 @@ from rigdda.app.uncertainty.observations import (
 )
 from rigdda.app.uncertainty.parameters import Parameter, Posterior, check_once, with_values
 from rigdda.app.uncertainty.score_surface import best_places
-from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs.outcome_cache import fingerprint
-from rigdda.files import atomic
+from rigdda.files import UNFINISHED, atomic
 from rigdda.lumped_mass import lumped
 from rigdda.passages import Passages, passages
 

@@ -255,17 +255,14 @@ def _deposit(
 ) -> DataSet:
     """Return the deposit in the rows of an event."""
     rows = sorted(rows, key=lambda row: row[1])
-    ends = [rows[0][1]]
+    edges = [rows[0][1]]
     for (where, _), start, end, _ in rows:
-        if start != ends[-1]:
-            hint = (
-                f"let it begin at {chainage(ends[-1])}, where the interval before it ends; give 0 "
-                "if "
-            )
-            raise BadInput(f"{where} start_m", start, f"{hint}there is no rock")
+        if start != edges[-1]:
+            hint = f"let it begin at {chainage(edges[-1])}, where the interval before it ends; "
+            raise BadInput(f"{where} start_m", start, f"{hint}give 0 if there is no rock")
         if end == start:
             raise BadInput(f"{where} end_m", end, f"let the interval end beyond {chainage(start)}")
-        ends.append(end)
+        edges.append(end)
     amounts = np.array([row[3] for row in rows])
     if len(rows) < 2 or not amounts.any():
         hint = "give two intervals or more, and rock in at least one"
@@ -279,4 +276,4 @@ def _deposit(
         raise BadInput(f"{rows[0][0][0]} releases", text, "give a whole number")
     count = check.integer(f"{rows[0][0][0]} releases", int(text), 1, JOB_RELEASES)
     shares = amounts / amounts.sum()
-    return DataSet(DEPOSIT, event, np.array(ends), math.nan, shares, count)
+    return DataSet(DEPOSIT, event, np.array(edges), math.nan, shares, count)

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 import rigdda
 from rigdda import MECHANICS, Layout, Outcome, Site
-from rigdda.app.unfinished import UNFINISHED
 from rigdda.envs import outcome_cache
 from rigdda.envs.cost import account
-from rigdda.files import atomic
+from rigdda.files import UNFINISHED, atomic
 
 Floats = NDArray[np.float64]
 

@@ -4,9 +4,7 @@ Batches as Stable-Baselines3 steps them play at least 256 episodes (16 with --qu
 actions with one release each, in threads on all cores. No two batches share a seed, so that none
 finds the cached outcomes of another. The site is quick with its groups and its jointed mass, or
 with single blocks only. Corridors have twelve sections of the validation split without large
-masses, and four releases of each section. `times_before`: episodes per second of processor time,
-which other jobs affect less, over those of 64 copies at commit 78de9db, when every episode was one
-release of the mass of quick at fidelity "fast".
+masses, and four releases of each section.
 
 Variance: of the reward of one release relative to the site's mean without barriers, compared with
 that relative to the same release without barriers, as before; means over random layouts, and for
@@ -37,9 +35,7 @@ BATCHES = (1, 8, 64, 1)
 
 EPISODES = 256
 
-BEFORE = {"rigdda/BarrierDesign-v0": 9.0, "rigdda/BarrierPlacement-v0": 5.6}
-"""Earlier episodes per second of processor time; 5.7 and 2.3 at fidelity "full", which is used
-now."""
+DESIGN_ENVIRONMENTS = ("rigdda/BarrierDesign-v0", "rigdda/BarrierPlacement-v0")
 
 LAYOUTS, SAMPLES, SITES = 8, 128, 6
 """Number of random layouts per site, of episodes per layout, and of generated sites."""
@@ -93,7 +89,6 @@ def measure(
     ended, steps = play(env, episodes)
     wall, busy = time.perf_counter() - wall, time.process_time() - busy
     env.close()
-    comparable = isinstance(site, Site) and len(site.events) > 1  # earlier episodes were of a mass
     return {
         "environment": name,
         "copies": copies,
@@ -104,7 +99,6 @@ def measure(
         "episodes_per_second": round(ended / wall, 3),
         "steps_per_second": round(steps / wall, 3),
         "episodes_per_processor_second": round(ended / busy, 3),
-        "times_before": round(ended / busy / BEFORE[name], 2) if comparable else None,
     }
 
 
@@ -113,7 +107,7 @@ def throughput(episodes: int) -> list[dict[str, Any]]:
     measure("rigdda/BarrierPlacement-v0", places()["quick"], 2, 4, 0)  # compile the kernels
     rows: list[dict[str, Any]] = []
     for label, site in places().items():
-        for name in BEFORE:
+        for name in DESIGN_ENVIRONMENTS:
             for copies in BATCHES:
                 seed = 1000 * (len(rows) + 1)
                 row = {"site": label} | measure(name, site, copies, episodes, seed)

@@ -1,7 +1,7 @@
 """Training of the value network of layouts on simulated layouts of generated sites.
 
-A training writes into one folder and continues from it: `value.json` (the terms), one `NAME.npz` a
-site with the features and the outcomes of its layouts, and `value.safetensors`.
+A training writes into one folder and continues from it: `value.json` (the terms), one `NAME.npz`
+for each site with the features and the outcomes of its layouts, and `value.safetensors`.
 """
 
 from __future__ import annotations

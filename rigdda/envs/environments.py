@@ -460,8 +460,9 @@ class BarrierDesign(BarrierEnv):
     Parameters
     ----------
     site : str, path, Site or sequence of these
-        As for `DesignProblem`; "train", "validation" or "test" draws another site of the split in
-        every episode, "random" is the same as "train", and a sequence of sites draws one of them.
+        As for `DesignProblem`, or a split of the generated sites (see `rigdda.sites.split`), such
+        as "train" or "wide-train", from which every episode draws a site; "random" means "train".
+        From a sequence of sites, every episode draws one of them.
         `reset(options={"site": ...})` takes the same values.
     max_barriers, kinds, targets, max_cost, fidelity, checks
         See `DesignProblem`. A barrier that would exceed `max_cost` is not built, and neither is one

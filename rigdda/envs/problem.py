@@ -143,7 +143,7 @@ def site_at_fidelity(site: Site, fidelity: str) -> Site:
 
     "full" returns the site unchanged. "fast" uses fewer, larger blocks in jointed masses and a
     longer time step; other blocks are unchanged. `rigdda fidelity` measures the bias and the
-    speed-up, which are reported in docs/fidelity.md.
+    speed-up on a site.
 
     Raises
     ------

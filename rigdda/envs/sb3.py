@@ -1,4 +1,4 @@
-"""Adapter to Stable-Baselines3, the only module that imports it."""
+"""Adapter to Stable-Baselines3."""
 
 from __future__ import annotations
 

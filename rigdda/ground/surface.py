@@ -28,7 +28,7 @@ WITHOUT_GROUND = {
 
 
 RETIRED = {
-    name: "remove it: damping was replaced by rolling resistance; give `rolling`, or name a ground"
+    name: "remove it: losses at the ground are described by `rolling`; give it, or name a ground"
     for name in ("damping", "damping_sd")
 }
 """Former keys of surfaces and interfaces, and what to do about them."""
@@ -54,7 +54,7 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     friction_deg: Annotated[
-        float, about("Coulomb friction angle. Without a ground 30.", "deg", ge=0.0, le=89.9)
+        float, about("Coulomb friction angle. Without a ground, it is 30.", "deg", ge=0.0, le=89.9)
     ] = _OPEN
     cohesion: Annotated[
         float,
@@ -72,7 +72,8 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     restitution: Annotated[
         Share | None,
         about(
-            "Coefficient of restitution of a central impact; 0: plastic. Without a ground 0.",
+            "Coefficient of restitution of a central impact; 0: plastic. Without a ground, it is "
+            "0.",
             "-",
         ),
     ] = _OPEN
@@ -81,15 +82,16 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         about(
             "Coefficient c of rolling resistance. In each contact, a moment of at most c N R acts "
             "against the rotation of a block, with the normal force N and R = sqrt(2 I/m) from its "
-            "moment of inertia I and mass m. Without a ground 0; in a site file, that of the "
-            "library ground that matches the name of the surface, with a warning.",
+            "moment of inertia I and mass m. Without a ground, it is 0; in a site file, that of "
+            "the library ground that matches the name of the surface, with a warning.",
             "-",
         ),
     ] = _OPEN
     friction_sd_deg: Annotated[
         float,
         about(
-            "Standard deviation of the friction angle from release to release. Without a ground 0.",
+            "Standard deviation of the friction angle from release to release. "
+            "Without a ground, it is 0.",
             "deg",
             ge=0.0,
             le=15.0,
@@ -98,7 +100,8 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     restitution_sd: Annotated[
         float,
         about(
-            "Standard deviation of the restitution from release to release. Without a ground 0.",
+            "Standard deviation of the restitution from release to release. "
+            "Without a ground, it is 0.",
             "-",
             ge=0.0,
             le=0.5,
@@ -108,7 +111,7 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         float,
         about(
             "Standard deviation of the coefficient of rolling resistance from release to release. "
-            "Without a ground 0.",
+            "Without a ground, it is 0.",
             "-",
             ge=0.0,
             le=0.5,
@@ -118,7 +121,8 @@ class Surface(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         float,
         about(
             "Root-mean-square depth of pits in the ground, which are about one block size apart. "
-            "Ground that overhangs or is steeper than 79 degrees has none. Without a ground 0.",
+            "Ground that overhangs or is steeper than 79 degrees has none. Without a "
+            "ground, it is 0.",
             "m",
             ge=0.0,
             le=2.0,

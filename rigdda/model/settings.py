@@ -146,7 +146,7 @@ def check_damping(damping: float, when: str, prefix: str = "") -> None:
     """
     if damping > 0.0 and when == "contact":
         hint = (
-            "damping in contact was replaced by rolling resistance: leave out the damping and give "
+            "losses in contact are described by rolling resistance: leave out the damping and give "
             '`rolling` to the surfaces, or use "always"'
         )
         raise BadInput(f"{prefix}damping_when", when, hint)

@@ -71,7 +71,9 @@ ranges. A surface takes the typical values except those that it specifies itself
 those of rigid blocks with corners, not those of a point mass, whose normal restitution also depends
 on the rotation of the block. Rolling resistance acts while a block touches the ground. It is the
 loss of rotating blocks that friction and restitution do not cover, and the least certain of the
-four properties. If you have no measurements, design for both ends of its range.
+four properties. The restitution in the table is that of a slow impact; on `weathered_rock` and
+`meadow`, it falls with the impact speed (`restitution_speed` of 9.144 m/s). If you have no
+measurements of rolling resistance, design for both ends of its range.
 """
 
 LAYOUT = """\

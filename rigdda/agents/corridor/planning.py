@@ -1,4 +1,4 @@
-"""Planning of a corridor: fronts, releases where they change the choice, and one choice a budget.
+"""Planning of a corridor: fronts of the sections, and one choice of layouts for each budget.
 
 The plan is made in four stages.
 

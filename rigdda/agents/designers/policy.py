@@ -1,9 +1,10 @@
 """A trained policy, which chooses a layout from a catalogue of relative layouts without a search.
 
-The score of each layout of the catalogue is its forecast Z (`prior`), corrected by a small neural
-network that sees the features of the forecast (`rigdda.agents.learning.forecasts`). The layout with
-the highest score is built. The network is evaluated with numpy and stored in a safetensors file
-together with the catalogue. `rigdda train` makes such a file, and one ships with the package.
+The score of each layout of the catalogue decreases with its forecast Z (`prior`). A small neural
+network, which sees the features of the forecast (`rigdda.agents.learning.forecasts`), corrects it.
+The layout with the highest score is built. The network is evaluated with numpy and stored in a
+safetensors file together with the catalogue. `rigdda train` makes such a file, and one ships with
+the package.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Learning of policies: relative layouts, their forecasts and outcomes, one algorithm a file."""
+"""Learning of policies: relative layouts, their forecasts and outcomes, and training algorithms."""

@@ -17,7 +17,7 @@ from rigdda.app.terminal import (
 )
 
 
-@click.command()
+@click.command(short_help="Check a site file, and draw the slope.")
 @click.argument("site")
 @seed_option("Seed of the releases that are tried.")
 @out_option("check-SITE")

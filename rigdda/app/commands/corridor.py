@@ -22,7 +22,7 @@ from rigdda.app.terminal import (
 )
 
 
-@click.command()
+@click.command(short_help="Plan the barriers of many slopes within one budget.")
 @click.argument("file", metavar="CORRIDOR")
 @click.option("--budget", "budgets", type=RealNumber(0.0, 1e12), multiple=True, metavar="EUR",
               help="Budget for construction. May be repeated.  [default: those of the "

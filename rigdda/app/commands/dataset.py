@@ -20,15 +20,15 @@ from rigdda.app.terminal import (
 from rigdda.model.site_names import SPLITS
 
 
-@click.command()
+@click.command(short_help="Write the outcomes of many layouts on many sites as Parquet.")
 @click.option("--split", type=click.Choice(SPLITS), default="train",
               show_default=True, help="Split of the generated sites to use.")  # fmt: skip
 @count_option(
     "--sites",
     1,
     12,
-    "Number of sites. With six, each family of the first version is used once, and with "
-    "nine, each of those with wide ranges.",
+    "Number of sites. Six sites contain each family of the first version once, and nine "
+    "contain each family with wide ranges once.",
 )
 @count_option("--layouts", 1, 32, "Number of layouts of each site.")
 @count_option("--releases", 1, 100, "Number of releases of each layout, over all events.")

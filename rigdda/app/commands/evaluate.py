@@ -39,8 +39,8 @@ from rigdda.model.site_names import SPLITS
     "--sites",
     1,
     6,
-    "Number of sites. With six, each family of the first version is used once, and with "
-    "nine, each of those with wide ranges.",
+    "Number of sites. Six sites contain each family of the first version once, and nine "
+    "contain each family with wide ranges once.",
 )
 @count_option("--verify", 10, 2_000, "Number of new releases for verifying each layout.")
 @seed_option("Seed of the searches and of their releases.", SEED)
@@ -58,8 +58,9 @@ def evaluate(
 ) -> None:
     """Compare designers on generated sites.
 
-    Prints how much more the layouts of each designer cost than the best layout of each site, as
-    means over the sites with 95 % intervals. Writes scores.csv. An interrupted run continues from
+    Prints for each designer the number of releases, Z of its layouts, the fall of Z, the difference
+    from the best designer of each site and the share of the greatest possible gain, as means over
+    the sites with 95 % intervals. Writes scores.csv. An interrupted run continues from
     evaluations.jsonl.
     """
     from rigdda.agents import designers

@@ -24,7 +24,7 @@ from rigdda.app.terminal import (
 )
 
 
-@click.command()
+@click.command(short_help="Score an optimiser or a policy on sites of the exam.")
 @click.option("--entry", required=True, metavar="MODULE:FUNCTION",
               help="Function that receives a task and returns a layout, such as "
               "mymodule:design.")  # fmt: skip

@@ -12,7 +12,7 @@ INSTALL = "pip install 'rigdda[page]'"
 """How the extra is installed."""
 
 
-@click.command("open")
+@click.command("open", short_help="Show a site in the browser, with barriers that can be moved.")
 @click.argument("target", required=False, metavar="[SITE | FILE | FOLDER]")
 @click.option("--port", type=WholeNumber(1, 65535), metavar="P",
               help="Port of the page.  [default: a free one]")  # fmt: skip

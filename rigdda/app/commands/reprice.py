@@ -17,7 +17,7 @@ from rigdda.app.terminal import (
 )
 
 
-@click.command()
+@click.command(short_help="Evaluate a design again with other prices or rates.")
 @click.argument("results", metavar="RESULTS", type=click.Path(path_type=Path))
 @click.option("--set", "settings", multiple=True, metavar="PATH=VALUE",
               help="New value of a key of the site file, such as consequences.closure=20000. May "

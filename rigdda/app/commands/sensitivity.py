@@ -56,10 +56,10 @@ def sensitivity(
 ) -> None:
     """Find which uncertain numbers of SITE the results depend on.
 
-    Varies the ground within the ranges of the library, block sizes, rates, prices and consequences,
-    and computes how much Z and, for each design event, the probabilities that the road is reached
-    and that a barrier fails depend on each. All points use the same releases. Prices and rates
-    need no additional simulation.
+    Varies block sizes, rates, prices, consequences and, within the ranges of the library, the
+    ground. Measures how much each of these numbers changes Z and, for each design event, the
+    probabilities that the road is reached and that a barrier fails. All points use the same
+    releases. Prices and rates need no additional simulation.
 
     Writes sensitivity.csv (indices with intervals), samples.csv (inputs and outputs at each point)
     and tornado.png. A run that was interrupted continues where it stopped.

@@ -298,7 +298,7 @@ def _station(rate: Row, own: dict[str, Row], what: str) -> str:
     energy, height, normal = own["energy"], own["height"], own.get("height_normal")
     level = "" if normal is None else f", {figure(float(normal['q95']))} m normal to the slope"
     return (
-        f"{where}{figure(float(rate['mean']))} releases a year pass on 100 m of road; 95 % of the "
+        f"{where}{figure(float(rate['mean']))} releases a year pass on 100 m of slope; 95 % of the "
         f"{int(rate['n']):,} passing blocks have less than {figure(float(energy['q95']))} kJ, and "
         f"the centres of 95 % are lower than {figure(float(height['q95']))} m above the ground"
         f"{level}."

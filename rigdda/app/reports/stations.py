@@ -1,6 +1,6 @@
 """Tables of what passes along a slope and at stations, and of where blocks stop.
 
-Units are the same in every table: kJ, m, m/s, rad/s, kg, and 1/year per 100 m of road. Energies are
+Units are the same in every table: kJ, m, m/s, rad/s, kg, and 1/year per 100 m of slope. Energies are
 those of a whole block, which is as long along the road as the root of its cross-section.
 """
 
@@ -465,7 +465,7 @@ def tables(rows: Rows) -> Iterator[tuple[str, Table]]:
             )
         line = (
             f"at {often['x_m']:g} m{survey} {often['n']:,} blocks pass, in "
-            f"{_words(often, 'mean')} releases a year per 100 m of road"
+            f"{_words(often, 'mean')} releases a year per 100 m of slope"
         )
         yield line, out
 

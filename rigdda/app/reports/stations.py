@@ -1,7 +1,7 @@
 """Tables of what passes along a slope and at stations, and of where blocks stop.
 
-Units are the same in every table: kJ, m, m/s, rad/s, kg, and 1/year per 100 m of slope. Energies are
-those of a whole block, which is as long along the road as the root of its cross-section.
+Units are the same in every table: kJ, m, m/s, rad/s, kg, and 1/year per 100 m of slope. Energies
+are those of a whole block, which is as long along the road as the root of its cross-section.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ class Archive(msgspec.Struct, frozen=True):
         Versions of the program and of the mechanics.
     site : Site
         The site as it was simulated.
-    max_barriers, kinds, targets, zone, max_cost
+    max_barriers, kinds, targets, zone, max_cost, checks
         Arguments of the `DesignProblem`; `zone` has two chainages.
     seed : int
         Seed of the search.
@@ -81,6 +81,7 @@ class Archive(msgspec.Struct, frozen=True):
     targets: Targets
     zone: tuple[float, float]
     max_cost: float | None
+    checks: str
     seed: int
     names: list[str]
     layouts: list[list[dict[str, Any]]]
@@ -124,6 +125,7 @@ def archive(
         targets=problem.targets,
         zone=(problem.zone.start, problem.zone.end),
         max_cost=problem.max_cost,
+        checks=problem.checks,
         seed=seed,
         names=[name for name, _ in cases],
         layouts=[to_tables(layout) for _, layout in cases],

@@ -20,7 +20,7 @@ from rigdda.fields import described
 from rigdda.files import LONGEST_NAME, atomic
 from rigdda.ground.barrier_zone import BarrierZone
 from rigdda.ground.grounds import GROUNDS, USUAL
-from rigdda.ground.prices import Consequences, Prices
+from rigdda.ground.prices import DITCHES, Consequences, Prices
 from rigdda.ground.surface import Surface
 from rigdda.ground.terrain import Terrain
 from rigdda.model import loose_blocks
@@ -71,6 +71,9 @@ JOINTS = ((70.0, 1.0), (-20.0, 1.0))
 
 PLACEHOLDER_TRAFFIC = (2000.0, 60.0, 100.0)
 """Placeholders of the vehicles per day, their speed [km/h] and the length of the road [m]."""
+
+BEDROCK = ("hard_rock", "weathered_rock", "asphalt")
+"""Grounds that cost as much to excavate as rock."""
 
 FOREST = (400.0, 0.3, 0.1)
 """Placeholders of the stems on a hectare, their diameter and its standard deviation [m]."""
@@ -275,7 +278,7 @@ class _Draft:
             Part("[road]", Road, edges),
             Part("[barrier_zone]", BarrierZone, ends | limits),
             *map(self._surface, self.surfaces),
-            _defaults("[prices]", Prices),
+            self._prices(),
             _defaults("[consequences]", Consequences),
             _defaults("[rule]", PartialFactors),
             Part(
@@ -551,6 +554,7 @@ class _Draft:
             self.named.add(surface)
         _check_apart(given, self.profile.origin)
         grounds["asphalt"] = USUAL["asphalt"]
+        grounds["concrete"] = USUAL["concrete"]  # of walls and fences
         ends = [at for span, _ in given for at in span]
         low, high = float(self.x[0]), float(self.x[-1])
         cuts = sorted({low, high, self.toe, *self.road, *ends})
@@ -600,6 +604,16 @@ class _Draft:
             {"ground": (self.surfaces[name], GIVEN if name in self.named else PLACEHOLDER)},
             (f"{ground.words}; give what you know better in place of these values:", *lines),
         )
+
+    def _prices(self) -> Part:
+        """Return the default prices, with a price of excavation for each surface of the ground."""
+        prices = _defaults("[prices]", Prices)
+        used = dict.fromkeys((self.base, *(part["surface"] for part in self.stretches)))
+        digging = dict(DITCHES)
+        for name in used:
+            rock = self.surfaces[name] in BEDROCK
+            digging.setdefault(name, DITCHES["rock" if rock else "soil"])
+        return prices._replace(values={**prices.values, "ditch": (digging, CHECK_DEFAULT)})
 
     def _duration(self) -> float:
         """Return how long a release is simulated [s], in steps of 5 s."""

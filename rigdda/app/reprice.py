@@ -27,13 +27,16 @@ from rigdda.agents.designers.frontier import TriedLayout, frontier, worst
 from rigdda.agents.designers.protocol import CHOICE_STREAM, End, of_chance, of_mean
 from rigdda.app import archive
 from rigdda.app.archive import Archive
+from rigdda.app.barrier_checks import check_layout
 from rigdda.app.design_study import ComparedLayouts, VerifiedLayout
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.barrier_formulas import BarrierCheck
 from rigdda.envs.cost import account, judge
 from rigdda.envs.ensemble import Ensemble, statistics
 from rigdda.envs.intervals import Estimate, Mean, estimate
 from rigdda.envs.outcome_cache import NO_EVENT_MOTION, NO_MOTION
 from rigdda.envs.problem import MISSED, Targets, excess, read_targets
+from rigdda.model.site_tables import SECTION
 from rigdda.seeds import is_of_stream
 
 BEST_OF_SEARCH = "best of search"
@@ -41,7 +44,10 @@ BEST_OF_SEARCH = "best of search"
 
 Value = bool | int | float | str | Mapping[str, Any]
 
-EVENT_KEYS = (*NO_EVENT_MOTION, "return_period", "section_length")
+PERIOD, LENGTH = "return_period", "section_length"
+"""Keys of an event that are read as its rate; the second is the length that the first refers to."""
+
+EVENT_KEYS = (*NO_EVENT_MOTION, PERIOD, LENGTH)
 """Keys of an event that do not affect its releases."""
 
 MOTION = (
@@ -55,11 +61,12 @@ LABELS = ("name", "description", "family", "origin", "lumped")
 
 
 class Change(NamedTuple):
-    """A value of a site file that was changed."""
+    """A value of a site file that was changed; `unit` says what a return period refers to."""
 
     path: str
     before: Any
     after: Any
+    unit: str = ""
 
 
 def parse(text: str) -> tuple[str, Value]:
@@ -125,8 +132,20 @@ def with_settings(site: Site, settings: Mapping[str, Value]) -> tuple[Site, tupl
     """
     changes = []
     for path, value in settings.items():
-        changes.append(Change(path, _present(site, path, value), value))
-        site = _with(site, path, value)
+        stem, _, key = path.rpartition(".")
+        period, length = f"{stem}.{PERIOD}", settings.get(f"{stem}.{LENGTH}")
+        before = _present(site, path, value)
+        if not path.startswith("events.") or key not in (PERIOD, LENGTH):
+            changes.append(Change(path, before, value))
+            site = _with(site, path, {}, value)
+        elif period not in settings:
+            raise BadInput(path, value, f"set {period}, which refers to this length, too")
+        elif key == PERIOD:
+            rate = _present(site, f"{stem}.rate", value)
+            site = _with(site, path, {} if length is None else {LENGTH: length}, value)
+            metres = SECTION if length is None else length  # a number, or _with refuses it
+            before = SECTION / (rate * metres) if rate else math.inf
+            changes.append(Change(path, before, value, f" years on {metres:g} m of slope"))
     return site, tuple(changes)
 
 
@@ -193,24 +212,29 @@ def _present(site: Site, path: str, value: Value) -> Any:
     return found
 
 
-def _with(site: Site, path: str, value: Value) -> Site:
-    """Return a site with one other value."""
+def _with(site: Site, path: str, more: Mapping[str, Value], value: Value) -> Site:
+    """Return a site with one other value, and `more` values of the same table."""
     top, keys = _table_of(site, path, value)
     table: Any = getattr(site, top)
     if not isinstance(table, tuple):
-        return msgspec.structs.replace(site, **{top: _changed(table, path, top, keys, value)})
+        return msgspec.structs.replace(site, **{top: _changed(table, path, top, keys, more, value)})
     index, keys = _named(site, path, value, top)
     where = f"{top}.{table[index].name}"
-    new = _changed(table[index], path, where, keys, value)
+    new = _changed(table[index], path, where, keys, more, value)
     return msgspec.structs.replace(site, **{top: (*table[:index], new, *table[index + 1 :])})
 
 
 def _changed(
-    table: msgspec.Struct, path: str, where: str, keys: Sequence[str], value: Value
+    table: msgspec.Struct,
+    path: str,
+    where: str,
+    keys: Sequence[str],
+    more: Mapping[str, Value],
+    value: Value,
 ) -> msgspec.Struct:
-    """Return a table of a site with one other value."""
-    found = {k: v for k, v in msgspec.to_builtins(table).items() if v is not None}
-    if keys[0] in ("return_period", "section_length"):
+    """Return a table of a site with one other value, and `more` values."""
+    found = {k: v for k, v in msgspec.to_builtins(table).items() if v is not None} | dict(more)
+    if keys[0] == PERIOD:
         found.pop("rate")
     inner = found
     for key in keys[:-1]:
@@ -307,12 +331,23 @@ class Repriced(ComparedLayouts):
         Number of layouts among which it was chosen.
     frontier : tuple of TriedLayout
         The cheapest layout for each level of P(reach), if the best layout misses a target.
+    required : bool
+        Whether the design required that every barrier meets its checks.
+    failed : dict of str to tuple of BarrierCheck
+        Checks that the barriers of each case do not meet, by its name.
     """
 
     changes: tuple[Change, ...]
     verified: bool
     tried: int
     frontier: tuple[TriedLayout, ...]
+    required: bool
+    failed: dict[str, tuple[BarrierCheck, ...]]
+
+    @property
+    def comparable(self) -> tuple[VerifiedLayout, ...]:
+        """The cases that may be proposed: if checks are required, those that meet them."""
+        return tuple(c for c in self.cases if not (self.required and self.failed[c.name]))
 
 
 def reprice(
@@ -345,29 +380,53 @@ def reprice(
     most = kept.max_cost if max_cost is None else max_cost
     problem = ArchivedProblem(kept, site, asked, most)
     found = _candidates(problem, kept)
-    best, evaluation = choose(problem, list(found.values()), kept)
+    required = kept.checks == "required"
+    field = [
+        c
+        for c in found.values()
+        if problem.place.too_expensive(c.layout) is None
+        and not (required and failed_checks(problem, c.layout, kept))
+    ]
+    best, evaluation = choose(problem, field, kept)
     cases = []
     for name, tables in zip(kept.names, kept.layouts, strict=True):
         layout = archive.layout_of(tables)
         cases.append(VerifiedLayout(name, judged(problem, found[layout], kept)))
     cases.append(VerifiedLayout(BEST_OF_SEARCH, evaluation))
-    tried = [c for c in found.values() if problem.place.too_expensive(c.layout) is None]
     front: tuple[TriedLayout, ...] = ()
     if evaluation.targets == MISSED:
         front = tuple(
             replace(one, verified=judged(problem, found[one.layout], kept))
             if found[one.layout].verified
             else one
-            for one in frontier([c.tried for c in tried if c.tried is not None])
+            for one in frontier([c.tried for c in field if c.tried is not None])
         )
     return Repriced(
         problem=problem,
         cases=tuple(cases),
         changes=changes,
         verified=best.verified,
-        tried=len(tried),
+        tried=len(field),
         frontier=front,
+        required=required,
+        failed={c.name: failed_checks(problem, c.evaluation.layout, kept) for c in cases},
     )
+
+
+def failed_checks(
+    problem: DesignProblem, layout: Layout, kept: Archive
+) -> tuple[BarrierCheck, ...]:
+    """Return the checks that the barriers of a layout do not meet.
+
+    The demand is that of the slope as it stands. Only for the layout that the design found, it is
+    also computed below the other barriers, as in the design.
+    """
+    found = (problem.place.failed_check(barrier) for barrier in layout)
+    failed = tuple(check for check in found if check is not None)
+    if failed and layout == archive.layout_of(kept.layouts[-1]):
+        free = DesignProblem(problem.site, kept.max_barriers, kept.kinds, zone=kept.zone)
+        return check_layout(free, layout).failed  # a new cap does not apply to the comparison
+    return failed
 
 
 def _merged(before: Targets, given: Mapping[str, float | None]) -> Targets:
@@ -494,7 +553,7 @@ SHORTLIST = 40
 def choose(
     problem: DesignProblem, candidates: Sequence[ScoredLayout], kept: Archive
 ) -> tuple[ScoredLayout, Evaluation]:
-    """Return the best candidate that may be built, and its evaluation.
+    """Return the best candidate and its evaluation.
 
     Among those that meet the targets, it is the one with the lowest Z. A layout that was not
     verified counts with the upper end of the 95 % interval of Z instead, so that no layout is
@@ -505,10 +564,9 @@ def choose(
     them are within the targets, others that are not shown to miss them by more and have at least
     half as many releases compete with it by Z, see `protocol.best_of_finals`.
     """
-    may = [c for c in candidates if problem.place.too_expensive(c.layout) is None]
-    field = [c for c in may if c.over <= 0.0]
+    field = [c for c in candidates if c.over <= 0.0]
     if not field:
-        may = [c for c in may if c.verified and c.layout] or may
+        may = [c for c in candidates if c.verified and c.layout] or candidates
         first = min(may, key=lambda c: (c.over, c.upper))
         enough = 0.5 * len(first.outcomes)
         field = [c for c in may if c.least <= first.over and len(c.outcomes) >= enough]

@@ -36,12 +36,13 @@ LONG = 2.0
 """Time of a release after which no other one of the event is tried [s]."""
 
 
+Range = tuple[float, float]
+
+
 class Trial(NamedTuple):
-    """Number of steps and processor time of trial releases of an event."""
+    """Processor time of trial releases of an event."""
 
     event: str
-    steps: int
-    """Greatest number of time steps of a release."""
     seconds: float
     """Mean processor time of a release [s]."""
     cut_off: bool
@@ -229,25 +230,23 @@ def try_releases(site: Site, seed: int = 0) -> list[Trial]:
         If one diverges.
     """
     batch, found = Batch(site, ()), []
-    batch.outcome(seed, site.event_names[0])  # compiles what is not compiled yet
     for event in site.events:
-        spent, steps, cut = [], 0, False
+        batch.outcome(seed, event.name)  # compiles what is not compiled yet
+        spent, cut = [], False
         for k in range(TIMED_RELEASES):
-            scene = site.realise((), seed + k, event.name)
-            steps = max(steps, math.ceil(site.motion.duration / site.settings(scene).dt))
             start = time.process_time()
             outcome = batch.outcome(seed + k, event.name)
             spent.append(time.process_time() - start)
             cut = cut or outcome.cut_off
             if spent[-1] > LONG:
                 break
-        found.append(Trial(event.name, steps, float(np.mean(spent)), cut))
+        found.append(Trial(event.name, float(np.mean(spent)), cut))
     return found
 
 
 def table(site: Site, trials: Sequence[Trial]) -> Table:
     """Return the table of events: rate, size, and computing effort of a release."""
-    found = empty_table(("event", "1/year", "years", "blocks", "m3", "t", "steps", "ms"))
+    found = empty_table(("event", "1/year", "years", "blocks", "m3", "t", "release", "ms"))
     for event, trial in zip(site.events, trials, strict=True):
         source = site.source(event.source)
         number, areas = blocks_of(event, source)
@@ -260,7 +259,7 @@ def table(site: Site, trials: Sequence[Trial]) -> Table:
             number,
             range_of(volumes),
             range_of(masses),
-            f"{trial.steps:,}",
+            range_of(size_of_release(event, source)[1]),
             f"{1e3 * trial.seconds:.3g}",
         )
     return found
@@ -277,6 +276,21 @@ def blocks_of(event: Event, source: Source) -> tuple[str, tuple[float, float]]:
         return number, event.area
     areas = _areas(source, 0)
     return f"{len(areas)}", (min(areas), max(areas))
+
+
+def size_of_release(event: Event, source: Source) -> tuple[Range, Range]:
+    """Return least and greatest width [m] and volume [m3] of a release of an event.
+
+    The volume is the sum of the cross-sections of the blocks times the width.
+    """
+    _, (least, most) = blocks_of(event, source)
+    if source.band is None:
+        width = event.width_of([])
+        volume = sum(_areas(source, 0)) * width
+        return (width, width), (volume, volume)
+    low, high = event.number
+    widths = event.width_of([least]), event.width_of([most])
+    return widths, (low * least * widths[0], high * most * widths[1])
 
 
 def _figures(value: float) -> str:
@@ -297,6 +311,8 @@ def time_of(site: Site, trials: Sequence[Trial]) -> str:
     cores = os.cpu_count() or 1
     return (
         "1/year and years: rate and return period on 100 m of slope; m3 and t: volume and mass of "
-        "a block; ms: processor time of a release.\n"
+        "a block, as long along the road as the root of its cross-section; release: volume of a "
+        "release [m3], the cross-sections of its blocks times the width of the event; ms: "
+        "processor time of a release\n"
         f"1,000 releases by rate take about {1000.0 * each / cores:,.0f} s on {cores} cores"
     )

@@ -72,6 +72,10 @@ SIZE_LIMITS = {"height": "max_height", "depth": "max_depth", "width": "max_width
           "thickness": "max_thickness"}  # fmt: skip
 """Limits of the zone for sizes of barriers."""
 
+GRIP = 5.0
+"""Difference between the friction angles of the ground and of rock from which on the base friction
+of a wall is doubted [deg]."""
+
 DOUBTED_PRICE_FACTOR = 20.0
 """Factor above or below a usual price beyond which its unit is doubted."""
 
@@ -153,6 +157,7 @@ def oddities(
         *_odd_profile(site),
         *_odd_surfaces(site),
         *_odd_zone(site),
+        *_odd_foundation(site),
         *_odd_forest(site),
         *_odd_existing(site),
         *_odd_traffic(site, written),
@@ -269,6 +274,30 @@ def _odd_zone(site: Site) -> Iterator[str]:
             yield (
                 f"barrier_zone.{name} = {value:g}: the largest block is {size:.1f} m long, so that "
                 "the best barrier will lie on this bound; allow more if it can be built"
+            )
+
+
+def _odd_foundation(site: Site) -> Iterator[str]:
+    """Yield what the ground of the zone lacks for the price of a ditch and the base of a wall."""
+    zone, prices = site.barrier_zone, site.prices.ditch
+    points, names = site.slope.chain()
+    ends = zip(points, points[1:], names, strict=False)
+    ground = dict.fromkeys(n for (a, _), (b, _), n in ends if a < zone.end and b > zone.start)
+    for name in ground:
+        if name not in prices:
+            yield (
+                f"prices.ditch has no price for {name!r}: a ditch there costs as much as in the "
+                f"most expensive ground, {max(prices.values()):g} EUR/m3; add "
+                f"{chr(34)}{name}{chr(34)} = PRICE to it"
+            )
+    own = site.surfaces["rock"].friction_deg
+    for name in ground if "concrete" not in site.surfaces else ():
+        base = site.surfaces[name].friction_deg
+        if base > own + GRIP:
+            yield (
+                f"surfaces has no concrete: a gravity wall stands on {name!r} with a base friction "
+                f"of {base:g} deg, which describes impacts of blocks; add [surfaces.concrete] with "
+                'ground = "concrete"'
             )
 
 

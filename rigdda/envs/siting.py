@@ -266,15 +266,22 @@ class Rules:
             yield from self._failed_checks(where, barrier)
         return start, end
 
-    def _failed_checks(self, where: str, barrier: Barrier) -> Iterator[BadInput]:
-        """Yield an error if a barrier fails a check of its kind."""
+    def failed_check(self, barrier: Barrier) -> BarrierCheck | None:
+        """Return the first check that a barrier fails, None if it meets all.
+
+        The demand is that of the slope as it stands, without other new barriers.
+        """
         if barrier not in self._failed:
             if len(self._failed) >= MOST_KNOWN:
                 self._failed.clear()
             demand = demand_at(self._envelope, self.site.rule, barrier.x)
             found = checks_of(self.site, barrier, demand)
             self._failed[barrier] = next((c for c in found if not c.satisfied), None)
-        failed = self._failed[barrier]
+        return self._failed[barrier]
+
+    def _failed_checks(self, where: str, barrier: Barrier) -> Iterator[BadInput]:
+        """Yield an error if a barrier fails a check of its kind."""
+        failed = self.failed_check(barrier)
         if failed is not None:
             hint = (
                 f"satisfy the check of {failed.check}, {failed.demand:.4g} of "

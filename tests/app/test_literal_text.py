@@ -67,7 +67,7 @@ def test_the_progress_bar_shows_a_name_as_it_is(name: str, capsys: pytest.Captur
 @pytest.mark.parametrize("name", NAMES)
 def test_tables_show_a_name_as_it_is(name: str, capsys: pytest.CaptureFixture[str]):
     site = called(name)
-    trials = [Trial(event.name, 100, 0.1, False) for event in site.events]
+    trials = [Trial(event.name, 0.1, False) for event in site.events]
     for table in (tables.sites([site]), site_check.table(site, trials), tables.empty_table([name])):
         show(table)
         assert name in plain(capsys.readouterr().out)

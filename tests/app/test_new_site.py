@@ -687,9 +687,43 @@ def test_rock_in_mid_air_looks_odd(slope):
         assert any("hangs" in line for line in oddities(rock)) == odd
 
 
+def test_ground_of_the_zone_has_a_price_and_walls_have_the_surface_of_concrete(tmp_path):
+    (tmp_path / "survey.csv").write_text(SOUND)
+    grounds = ("--ground", "meadow:72-112", "--ground", "weathered_rock:22-72")
+    run("new", "survey", "--profile", "survey.csv", *ASKED, *grounds, folder=tmp_path)
+    site = Site.load(tmp_path / "survey.toml")
+    own = {"rock": 40.0, "soil": 15.0, "meadow": 15.0, "weathered_rock": 40.0, "asphalt": 40.0}
+    assert site.prices.ditch == own
+    scene = site.realise([rigdda.GravityWall(site.barrier_zone.end - 3.0, 2.0, 1.0)], 0)
+    assert scene.barrier_surface == "concrete"
+    weight = 9.81 * scene.barriers[0].density * abs(rigdda.geometry.moments_of(scene.outline(0))[0])
+    for name in ("meadow", "concrete"):
+        angle = scene.surfaces[name].friction_deg
+        assert scene.resistance(0) <= weight * np.tan(np.radians(angle)) * (1.0 + 1e-9)
+    told = [line for line in oddities(site) if "concrete" in line or "prices.ditch" in line]
+    assert told == []
+    bare = {name: one for name, one in site.surfaces.items() if name != "concrete"}
+    prices = replace(site.prices, ditch={"rock": 40.0, "soil": 15.0})
+    told = oddities(replace(site, surfaces=bare, prices=prices))
+    assert any("[surfaces.concrete]" in line and "'meadow'" in line for line in told)
+    assert any(line.startswith("prices.ditch has no price for 'meadow'") for line in told)
+
+
+@pytest.mark.parametrize("name", ["verge", "shu-hwa", "quick"])
+def test_the_volume_of_a_release_is_in_the_range_that_the_check_tells(name):
+    site = Site.load(name)
+    for event in site.events:
+        (narrow, wide), (least, most) = site_check.size_of_release(event, site.source(event.source))
+        for seed in range(3):
+            (outcome,) = rigdda.release_many([(site, (), seed, event.name)])
+            slack = 0.3 if event.area is None else 1e-9  # blocks of a mass are cut anew each time
+            assert narrow * (1 - 1e-9) <= outcome.width <= wide * (1 + 1e-9)
+            assert least * (1 - slack) <= outcome.released_volume <= most * (1 + slack)
+
+
 def test_releases_that_are_cut_off_look_odd(slope):
     name = slope.event_names[0]
-    line = oddities(slope, [Trial(name, 100, 0.1, True)])
+    line = oddities(slope, [Trial(name, 0.1, True)])
     assert len(line) == 1 and "motion.duration" in line[0]
 
 

@@ -17,6 +17,7 @@ import rigdda
 from rigdda import MECHANICS, BadInput, Outcome, Site
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.app import archive, design, reprice
+from rigdda.app.barrier_checks import check_layout
 from rigdda.app.reports import design_report
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation, ensemble
@@ -212,6 +213,58 @@ def test_a_what_if_takes_less_than_five_seconds(designed: Path) -> None:
     assert time.process_time() - start < 5.0
 
 
+@pytest.fixture(scope="module")
+def checked(site: Site, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a design in which every barrier must meet its checks."""
+    folder = tmp_path_factory.mktemp("checked")
+    problem = DesignProblem(site, checks="required")
+    design.design(problem, "race", 500, 0, VERIFIED, folder, lambda *_: None)
+    return folder
+
+
+def test_a_design_with_required_checks_is_priced_with_them(checked: Path) -> None:
+    kept, chosen = archive.read(checked), set()
+    for closure in (1e3, 5e4, 1e7):
+        done = reprice.reprice(checked, {"consequences.closure": closure})
+        layout = done.chosen.evaluation.layout
+        assert check_layout(done.problem, layout).satisfied
+        assert not done.failed[reprice.BEST_OF_SEARCH]
+        failing = [
+            c for c in done.cases if not check_layout(done.problem, c.evaluation.layout).satisfied
+        ]
+        assert {c.name for c in failing} == {c.name for c in done.cases} - {
+            c.name for c in done.comparable
+        }
+        assert done.tried < len(kept.releases)  # the search without checks tried others
+        chosen.add(layout)
+    assert len(chosen) > 1
+
+
+def test_a_best_layout_that_fails_a_check_is_not_to_be_built(
+    designed: Path, tmp_path: Path
+) -> None:
+    costly = ("--set", "consequences.closure=1000000", "--target", 0.9)
+    words = run("reprice", designed, *costly, "--out", "o", folder=tmp_path)
+    row = rows(tmp_path / "o/costs.csv")[-1]
+    assert row["meets_checks"] == "False"
+    assert "Do not build this as it is: " in words and "'best of search' fails its checks" in words
+
+
+def test_a_return_period_is_compared_on_the_same_length(designed: Path) -> None:
+    kept = archive.read(designed)
+    rate = next(event.rate for event in kept.site.events if event.name == "block")
+    path = "events.block.return_period"
+    site, (change,) = reprice.with_settings(kept.site, {path: 100.0 / (rate * 100.0)})
+    assert site == kept.site and change.before == pytest.approx(change.after)
+    both = {path: 4.0, "events.block.section_length": 180.0}
+    for settings in (both, dict(reversed(both.items()))):
+        site, (change,) = reprice.with_settings(kept.site, settings)
+        (event,) = (event for event in site.events if event.name == "block")
+        assert event.rate == pytest.approx(100.0 / (4.0 * 180.0))
+        assert change.before == pytest.approx(100.0 / (rate * 180.0))
+        assert "180 m" in change.unit
+
+
 def test_the_command_answers_in_a_folder_of_its_own(designed: Path, tmp_path: Path) -> None:
     before = {path.name: path.read_bytes() for path in designed.iterdir() if path.is_file()}
     options = ("--set", "consequences.closure=20000", "--set", "prices.lives.fence=25")
@@ -253,6 +306,8 @@ def reprice_empty(value: object) -> bool:
         ("prices.life.fence=10", ("prices.life.fence = 10", "shorten")),
         ("events.block.area=[1.0, 2.0]", ("events.block.area", "rigdda design")),
         ("events.block.rate=-1", ("events.block.rate = -1", "at least 0")),
+        ("events.block.section_length=180", ("section_length = 180", "events.block.return_period")),
+        ("events.block.return_period=0", ("events.block.return_period = 0",)),
         ("events.block.ratee=1", ("events.block.ratee = 1", "did you mean rate")),
         ("events.stone.rate=1", ("events.stone.rate = 1", "block, group")),
         ("events.block=1", ("events.block = 1", "events.block.KEY")),

@@ -47,8 +47,9 @@ def reprice(
     """Evaluate the design in the folder RESULTS again with other prices, rates, targets or caps.
 
     Nothing is simulated: the outcomes of all releases of the design are evaluated with the new
-    values. The last row of the table is the best of all layouts that the search evaluated. Keys
-    on which the motion of rock depends are refused.
+    values. The last row of the table is the best of all layouts that the search evaluated; if the
+    design required checks, only layouts whose barriers meet them are considered. Keys on which the
+    motion of rock depends are refused.
 
     Writes costs.csv, site.toml (the site with the new values), layout.toml (the best layout),
     cost.png and, if a target is missed, frontier.csv and frontier.png. For a site with traffic, it
@@ -68,6 +69,7 @@ def reprice(
         reprice_report.write(done, folder)
     for change in done.changes:
         click.echo(reprice_report.changed(change))
+    click.echo(f"{findings.headline(reprice_report.answer(done))}\n")
     show(tables.costs(done))
     chances = tables.chances(done)
     if chances is not None:

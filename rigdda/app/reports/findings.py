@@ -17,6 +17,7 @@ from rigdda.app.design_study import ComparedLayouts, DesignStudy, design_events
 from rigdda.app.reports.wording import at_most, before, euros, order, percent, percentage, span
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.barrier_formulas import BarrierCheck
 from rigdda.envs.problem import MET, MISSED, UNDECIDED, Targets
 from rigdda.envs.siting import FeasiblePlaces
 
@@ -61,6 +62,8 @@ class DesignAnswer(NamedTuple):
     reaching : (str, float)
         The design event that most often reaches the road with the layout, empty without design
         events, and the share of its releases that do [-].
+    verified : bool
+        Whether Z was computed from releases that no search used.
     """
 
     layout: str
@@ -72,6 +75,7 @@ class DesignAnswer(NamedTuple):
     required: bool
     failed: Sequence[FailedCheck]
     reaching: tuple[str, float]
+    verified: bool = True
 
 
 def headline(answer: DesignAnswer) -> str:
@@ -96,6 +100,11 @@ def headline(answer: DesignAnswer) -> str:
         return f"Build nothing: no layout was found that {worth} its cost."
     if fails:
         return f"Do not build this as it is: {layout}.{fails}"
+    if not answer.verified:
+        return (
+            f"Verify with a new design before you build: {layout}. Its Z is that of the releases "
+            "by which it was chosen."
+        )
     if answer.targets not in (None, MET):
         return (
             f"Verify with more releases before you build: {layout}. These releases do not decide "
@@ -416,7 +425,12 @@ def compliance(done: DesignStudy) -> str:
 def for_comparison(done: DesignStudy) -> list[str]:
     """Return a line on the layouts for comparison that may not be proposed."""
     kept = {case.name for case in (*done.comparable, *filter(None, [done.unchecked]))}
-    names = [repr(case.name) for case in done.cases if case.name not in kept]
+    return compared_only([case.name for case in done.cases if case.name not in kept])
+
+
+def compared_only(layouts: Sequence[str]) -> list[str]:
+    """Return a line on layouts that fail a required check, which are given by their names."""
+    names = [repr(name) for name in layouts]
     if not names:
         return []
     fail = "fails a required check and is" if len(names) == 1 else "fail required checks and are"
@@ -425,9 +439,12 @@ def for_comparison(done: DesignStudy) -> list[str]:
 
 def failed_checks(checks: LayoutChecks) -> list[FailedCheck]:
     """Return the checks of a layout that are not met, for a headline."""
-    return [
-        FailedCheck(f"{c.barrier}, at {c.x:.1f} m", c.check, c.use / c.limit) for c in checks.failed
-    ]
+    return in_words(checks.failed)
+
+
+def in_words(failed: Sequence[BarrierCheck]) -> list[FailedCheck]:
+    """Return checks that are not met, for a headline."""
+    return [FailedCheck(f"{c.barrier}, at {c.x:.1f} m", c.check, c.use / c.limit) for c in failed]
 
 
 def reaching(evaluation: Evaluation, site: Site) -> tuple[str, float]:

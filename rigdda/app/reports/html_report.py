@@ -89,8 +89,10 @@ class ReportSection:
 METHOD_LIMITS = (
     "The section is two-dimensional. Blocks do not leave its plane, and channels or ridges that "
     "gather or spread rock along the road are not represented.",
-    "A block is as long along the road as the root of its cross-section. Volumes, masses and "
-    "energies of whole blocks are based on this assumption.",
+    "A block is as long along the road as the root of its cross-section; the masses and energies "
+    "of whole blocks are based on this assumption. Releases of several blocks are strips as wide "
+    "as their event: their volumes, the cost of closure and clearing and the load on fences, whose "
+    "energy class acts on this width, follow from it.",
     "Blocks are rigid and do not break. A block that shatters loses energy, and its fragments may "
     "fly farther.",
     "Snow and water are neglected, and so are trees, except those of a table [[forest]].",

@@ -280,6 +280,7 @@ EXHIBITS = (
             money("repair", "repair"),
             money("to build", "cost"),
             words("targets", "targets"),
+            words("meets its checks", "meets_checks"),
             words("verified", "verified"),
             value("releases", "releases"),
         ),

@@ -10,7 +10,7 @@ from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.app.design_study import SHED
 from rigdda.app.reports import design_report, findings, pictures
 from rigdda.app.reports.tables import known_risks, write_risks, write_rows
-from rigdda.app.reports.wording import number
+from rigdda.app.reports.wording import before, number, order
 from rigdda.app.reprice import BEST_OF_SEARCH, Change, Repriced
 from rigdda.envs import Evaluation
 
@@ -51,6 +51,7 @@ def _row(done: Repriced, name: str, e: Evaluation) -> dict[str, Any]:
         "targets": e.targets or "",
         "releases": e.releases,
         "verified": name != BEST_OF_SEARCH or done.verified,
+        "meets_checks": not done.failed[name],
     }
     site = done.problem.site
     if any(event.design for event in site.events):
@@ -67,7 +68,24 @@ def _row(done: Repriced, name: str, e: Evaluation) -> dict[str, Any]:
 def changed(change: Change) -> str:
     """Return a change in words."""
     before = "default" if change.before is None else number(change.before)
-    return f"{change.path} = {number(change.after)} (was {before})"
+    return f"{change.path} = {number(change.after)} (was {before}){change.unit}"
+
+
+def answer(done: Repriced) -> findings.DesignAnswer:
+    """Return what the first line of the answer needs."""
+    site, chosen, nothing = done.problem.site, done.chosen.evaluation, done.nothing.evaluation
+    return findings.DesignAnswer(
+        layout="; ".join(order(barrier, site) for barrier in chosen.layout),
+        bare=before(site),
+        z=(chosen.objective, *chosen.ci),
+        nothing=(nothing.objective, *nothing.ci),
+        targets=chosen.targets,
+        asked=findings.asked_words(done.problem.targets),
+        required=done.required,
+        failed=findings.in_words(done.failed[BEST_OF_SEARCH]),
+        reaching=findings.reaching(chosen, site),
+        verified=done.verified,
+    )
 
 
 def sentences(done: Repriced) -> list[str]:
@@ -84,8 +102,14 @@ def sentences(done: Repriced) -> list[str]:
         line += f"{chosen.releases:,} releases of the search by which it was chosen, and probably "
         line += "too low; the command rigdda design with site.toml searches and verifies again"
     lines = [line]
+    if failed := done.failed[BEST_OF_SEARCH]:
+        words = findings.failed_words(findings.in_words(failed))
+        lines.append(f"{BEST_OF_SEARCH!r} fails its checks: {words}")
     lines += findings.over_the_cap(done.problem, cases)
-    lines.append(findings.no_layout_pays(done.problem.site, cases))
+    comparable = [(case.name, case.evaluation) for case in done.comparable]
+    names = {name for name, _ in comparable}
+    lines += findings.compared_only([name for name, _ in cases if name not in names])
+    lines.append(findings.no_layout_pays(done.problem.site, comparable))
     lines += [*findings.failing(done.problem.site, chosen)]
     lines.append(findings.undecided(done.problem, chosen))
     lines.append(findings.left_over(chosen))

@@ -74,12 +74,16 @@ def event_table(site: Site) -> Table:
             number,
             site_check.range_of(volumes),
             site_check.range_of([volume * source.density / 1e3 for volume in volumes]),
+            *map(site_check.range_of, site_check.size_of_release(event, source)),
         ))  # fmt: skip
-    head = ("event", "source", "design event", "1/year", "years", "blocks", "m³", "t")
+    head = ("event", "source", "design event", "1/year", "years", "blocks", "m³", "t", "width [m]",
+            "release [m³]")  # fmt: skip
     words = (
         "How often each event happens on 100 m of slope, as a rate and as a return period, and the "
         "number, volume and mass of its blocks. A block is as long along the road as the root of "
-        "its cross-section. Targets apply to design events."
+        "its cross-section. A release of several blocks is a strip of the given width: its volume, "
+        "on which closure and clearing depend, is the sum of the cross-sections times this width. "
+        "Targets apply to design events."
     )
     return listed("Events", words, head, rows, head[3:])
 

@@ -46,11 +46,14 @@ class Study:
         Number of releases of each event with each layout.
     layouts : dict of str to Layout
         The layouts by name.
+    source : str
+        Name of the site, or its file.
     """
 
     site: Site
     releases: int
     layouts: dict[str, Layout]
+    source: str = ""
 
     @property
     def size(self) -> int:
@@ -83,7 +86,8 @@ def load(path: str | os.PathLike[str]) -> Study:
         raise BadInput("study", str(path), "name an existing TOML file")
     data = _StudyFile(**checked(_StudyFile, parse("study", str(path), read("study", file))))
     near = file.parent / data.site
-    site = Site.load(near if near.suffix == ".toml" else data.site)
+    source = str(near) if near.suffix == ".toml" else data.site
+    site = Site.load(source)
     layouts: dict[str, Layout] = {}
     faults: list[BadInput] = []
     for i, table in enumerate(data.layouts):
@@ -99,7 +103,7 @@ def load(path: str | os.PathLike[str]) -> Study:
         raise BadInput("layouts", 0, "give at least one table [[layouts]]")
     most = limits.JOB_RELEASES // len(layouts) // len(site.events)
     releases = check.integer("releases", data.releases, 1, most)
-    return Study(site, releases, layouts)
+    return Study(site, releases, layouts, source)
 
 
 def _layout(site: Site, table: _LayoutTable, folder: Path) -> tuple[Layout, list[BadInput]]:

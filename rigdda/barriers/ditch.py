@@ -85,11 +85,8 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
         BadInput
             If the ditch does not fit.
         """
-        old = span("ditch x", ground, self.x, self.end)
-        (left, high), (right, low) = old[0], old[-1]
-        floor = min(high, low) - self.depth
-        first = left + self.side_slope * (high - floor)
-        last = right - self.side_slope * (low - floor)
+        line = self._line(ground)
+        (left, _), (first, _), (last, _), (right, _) = line.tolist()
         if last - first < 1e-6:
             least = first - left + right - last
             raise BadInput(
@@ -97,8 +94,27 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
                 self.width,
                 f"give more than {least:g}, or less depth: its sides meet above the floor",
             )
-        line = np.array([[left, high], [first, floor], [last, floor], [right, low]])
         return regrade("ditch x", ground, line, np.minimum, None)
+
+    def _line(self, ground: Terrain) -> Floats:
+        """Return its edges and the corners of its floor, (4, 2), going downhill."""
+        old = span("ditch x", ground, self.x, self.end)
+        (left, high), (right, low) = old[0], old[-1]
+        floor = min(high, low) - self.depth
+        first = left + self.side_slope * (high - floor)
+        last = right - self.side_slope * (low - floor)
+        return np.array([[left, high], [first, floor], [last, floor], [right, low]])
+
+    def cut(self, ground: Terrain) -> tuple[float, float]:
+        """Return the height of its uphill side and the width of its floor [m].
+
+        Raises
+        ------
+        BadInput
+            If the ditch does not lie on the ground.
+        """
+        (_, high), (first, floor), (last, _), _ = self._line(ground).tolist()
+        return high - floor, last - first
 
     def price(self, site: KnownSite, outline: Floats | None) -> float:
         """Return the cost of the excavation without the surcharge for height [EUR/m].

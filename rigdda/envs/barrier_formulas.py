@@ -176,7 +176,10 @@ class Base(NamedTuple):
     @classmethod
     def of(cls, site: Site, barrier: GravityWall | Embankment) -> Base:
         """Return how a barrier stands on the ground of a site."""
-        scene = site.realise((barrier,), 0, site.event_names[0])
+        # checks use the mean values of the surfaces, not those of a release
+        drawn = site.draw(0, site.event_names[0])
+        drawn = drawn._replace(strengths=(), friction_deg=0.0, roughness=None)
+        scene = site.scene(drawn, site.built(site.as_built((barrier,)), drawn.width))
         outline, gravity = scene.outline(0), -scene.gravity_vector[1]
         wall = isinstance(barrier, GravityWall)
         own = scene.barrier_surface if wall else scene.fill

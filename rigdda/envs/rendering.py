@@ -275,8 +275,8 @@ def _write_labels(axes: Axes, labels: Sequence[Label], point: float) -> None:
             textcoords="offset points",
             va="bottom",
             color=label.colour,
-            zorder=7,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+            zorder=7.0 - 0.01 * len(taken),  # so that its leader line passes behind other labels
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.9, "pad": 1.0},
             arrowprops={
                 "arrowstyle": "-", "color": label.colour, "shrinkA": 0.0, "shrinkB": 0.0,
                 "relpos": (begins, 0.0),

@@ -12,8 +12,15 @@ from rigdda import Ditch, Embankment, Fence, GravityWall, Site
 from rigdda.agents.designers import rule
 from rigdda.agents.designers.menu import Menu
 from rigdda.app.barrier_checks import LayoutChecks, check_layout
+from rigdda.app.reports.design_report import check_notes
 from rigdda.envs import DesignProblem, design_envelope
-from rigdda.envs.barrier_formulas import PRESSURE_ON_ROCK, PRESSURE_ON_SOIL, BarrierCheck, Base
+from rigdda.envs.barrier_formulas import (
+    PRESSURE_ON_ROCK,
+    PRESSURE_ON_SOIL,
+    BarrierCheck,
+    Base,
+    checks_of,
+)
 from rigdda.envs.fence_checks import demand_at
 from rigdda.envs.ritchie_ditch import RitchieDitch
 from rigdda.model.existing import Existing
@@ -90,6 +97,45 @@ def test_a_wall_is_checked_by_hand_formulas(problem: DesignProblem) -> None:
     assert checks["bearing, rock"].demand == pytest.approx(1e-3 * base.weight / pressed)
     assert checks["bearing, rock"].capacity in (1e-3 * PRESSURE_ON_ROCK, 1e-3 * PRESSURE_ON_SOIL)
     assert checks["sliding, rock"].limit == pytest.approx(1.0 / 1.5)
+
+
+@pytest.mark.parametrize("name", ["bench", "narrow", "talus", "quick"])
+def test_checks_use_the_mean_strength_of_the_ground(name: str) -> None:
+    """Not that of a release, which varies by several degrees."""
+    site = Site.load(name)
+    wall = Menu(DesignProblem(site)).nearest(GravityWall(9.0, 1.5, 1.0), site.barrier_zone.end)
+    assert isinstance(wall, GravityWall)
+    angles = {surface.friction_deg for surface in site.surfaces.values()}
+    base = Base.of(site, wall)
+    angle = math.degrees(math.atan(base.friction))
+    assert min(abs(angle - one) for one in angles) < 1e-9
+    assert base.restitution in {s.restitution for s in site.surfaces.values()}
+    assert any(surface.friction_sd_deg > 0.0 for surface in site.surfaces.values())
+
+
+def test_what_is_not_checked_is_told() -> None:
+    problem = DesignProblem("talus", kinds=KINDS)
+    dam = Menu(problem).nearest(Embankment(90.0, 4.0, 1.0), 90.0)
+    assert dam is not None
+    (line,) = (w for w in check_notes(check_layout(problem, (dam,))) if "penetration" in w)
+    assert dam.label in line
+    ditch = Ditch(6.0, 1.0, 3.0)
+    for rise, outside in ((30.0, False), (60.0, True)):
+        site = cut_of(rise)
+        table = tuple(checks_of(site, ditch, None))
+        told = [w for w in check_notes(LayoutChecks((), table, ())) if "not verified" in w]
+        assert len(told) == outside
+
+
+def cut_of(rise: float) -> Site:
+    """A site with a cut of 55 degrees of this height [m]."""
+    site = Site.load("quick")
+    foot = site.slope.toe
+    run_ = rise / math.tan(math.radians(55.0))
+    points = ((foot - run_ - 20.0, rise), (foot - run_, rise), (foot, 0.0), (foot + 80.0, -1.0))
+    return msgspec.structs.replace(
+        site, slope=msgspec.structs.replace(site.slope, points=points, surfaces=())
+    )
 
 
 def test_an_embankment_slides_but_does_not_overturn() -> None:

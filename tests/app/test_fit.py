@@ -136,7 +136,7 @@ def test_only_numbers_of_the_site_are_fitted(path):
         ("event,run_out_m\nrock,3\n", "rock"),
         ("event,run_out_m\nblock,far\n", "row 1"),
         ("event,run_out_m\nblock,10\n", "three observed runs"),
-        ("event,run_out_m\nblock,45\n", "move road.end beyond it"),
+        ("event,run_out_m\nblock,45\n", "the road ends beyond all observed stops"),
         ("event,run_out_m\nblock,3,1\n", "row 1 = 'block,3,1': give 2 cells"),
         ("event,run_out_m\n,3\n", "row 1 event = '': choose small, face or "),
         ("event,run_out_m,run_out_m\nblock,3,4\n", "a different name"),

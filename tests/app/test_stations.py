@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import time
 from fractions import Fraction
 from pathlib import Path
@@ -18,6 +19,7 @@ from rigdda import Fence, Site
 from rigdda.app.reports import stations
 from rigdda.app.reports.simulation_report import TABLES
 from rigdda.app.reports.stations import QUANTILE_LEVELS, QUANTITIES, Passing
+from rigdda.app.reports.wording import figure
 from rigdda.envs.intervals import mid_p
 from rigdda.envs.quantiles import quantiles
 from rigdda.files import UNFINISHED
@@ -167,6 +169,25 @@ def test_pictures_are_there_and_the_printed_figures_are_those_of_the_table(
 
 def re_lines(text: str, word: str) -> list[str]:
     return [line for line in text.splitlines() if word in line]
+
+
+def test_design_events_are_told_apart_from_the_many_small_blocks(
+    simulated: tuple[Path, str],
+) -> None:
+    folder, words = simulated
+    site, table = Site.load("verge"), rows(folder / "stations.csv")
+    told = stations.of_design_events(site, table)
+    assert [line for line in words.splitlines() if line.startswith("design event")] == told
+    design = [event.name for event in site.events if event.design]
+    assert len(told) == 2 * len(design)  # at each station
+    for line in told:
+        name, x = re.match(r"design event '(.*)' at (\S+) m", line).groups()
+        row = next(r for r in table if r["event"] == name and float(r["x_m"]) == float(x)
+                   and r["quantity"] == "energy")  # fmt: skip
+        if int(row["n"]) < stations.FEW_PASSAGES:
+            assert f"only {row['n']} block" in line and f"--event {name}" in line
+        else:
+            assert f"less than {figure(float(row['q95']))} kJ" in line
 
 
 def test_where_blocks_stop_is_told_beyond_the_road(simulated: tuple[Path, str]) -> None:

@@ -278,7 +278,9 @@ def why(problem: DesignProblem, asked: list[Demand]) -> str:
         needed = 1e-3 * demand.energy() * near.factors.energy
         words.append(f"it needs {needed:,.0f} kJ, with factors, of {near.factors.level}")
     if near.height_use > 1.0:
-        words.append(f"it needs a height of {demand.height():.1f} m")
+        limit = problem.zone.max_height
+        most = ", more than barrier_zone.max_height" if demand.height() > limit else ""
+        words.append(f"it needs a height of {demand.height():.1f} m{most}")
     if near.elongation_use > 1.0:
         room = f"{near.design_elongation:.1f} m, and the road is {near.clearance:.1f} m away"
         words.append(f"its elongation times its factor is {room}")

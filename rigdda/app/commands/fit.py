@@ -12,11 +12,13 @@ from rigdda.app.terminal import (
     count_option,
     executor_option,
     folder_for,
+    note,
     out_option,
     progress,
     recorded_run,
     seed_option,
     show,
+    warn_of_placeholders,
 )
 from rigdda.files import remove_unfinished
 
@@ -59,6 +61,7 @@ def fit(
     """
     import rigdda
     from rigdda.app.reports import tables
+    from rigdda.app.site_oddities import oddities
     from rigdda.app.uncertainty import fit as job
     from rigdda.app.uncertainty import observations
     from rigdda.app.uncertainty.parameters import parse
@@ -75,4 +78,9 @@ def fit(
         tables.write_rows(folder / "posterior.csv", found.posterior.rows())
         remove_unfinished(folder)
     show(tables.fit(job.rows(found, found.observed)))
+    before = {*oddities(where)}
+    for line in oddities(found.site):
+        if line not in before:
+            note(f"the fitted site looks odd: {line}")
+    warn_of_placeholders(site)
     click.echo(f"up to {budget} parameter sets; {', '.join(files)} are in {folder}")

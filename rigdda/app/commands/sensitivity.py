@@ -22,6 +22,7 @@ from rigdda.app.terminal import (
     recorded_run,
     seed_option,
     show,
+    warn_of_placeholders,
 )
 from rigdda.files import remove_unfinished
 
@@ -83,6 +84,7 @@ def sensitivity(
         click.echo(line)
         show(table)
     finding(sensitivity_report.explain(found))
+    warn_of_placeholders(site)
     resumed = f", {found.resumed:,} from an interrupted run" if found.resumed else ""
     click.echo(
         f"{len(asked.sites):,} points with {len(asked.groups):,} simulated sites, {asked.size:,} "

@@ -104,6 +104,9 @@ def simulate(
         click.echo(line)
         show(table)
     click.echo("95 % intervals; ?: too few blocks for this end; height: of the centre of a block")
+    if event is None:
+        for line in stations.of_design_events(where, rows):
+            click.echo(line)
     note(findings.of_layout(where, barriers, event))
     warn_of_placeholders(site)
     note(stations.undecided(passing))

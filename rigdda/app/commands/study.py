@@ -18,6 +18,7 @@ from rigdda.app.terminal import (
     recorded_run,
     seed_option,
     show,
+    warn_of_placeholders,
 )
 
 
@@ -75,6 +76,7 @@ def study(file: str, seed: int, worst: int, out: Path | None) -> None:
     for name, layout in asked.layouts.items():
         if words := findings.unbuildable(asked.site, layout):
             note(f"the layout {name!r} {words}")
+    warn_of_placeholders(asked.source)
     words = f", {resumed} from an earlier run" if resumed else ""
     click.echo(f"{asked.size:,} releases{words}; tables and pictures are in {folder}")
 

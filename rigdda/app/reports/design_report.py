@@ -39,7 +39,14 @@ from rigdda.app.reports.pictures import (
     trajectories,
 )
 from rigdda.app.reports.simulation_report import along
-from rigdda.app.reports.tables import bounded, empty_table, known_risks, write_risks, write_rows
+from rigdda.app.reports.tables import (
+    bounded,
+    chance_columns,
+    empty_table,
+    known_risks,
+    write_risks,
+    write_rows,
+)
 from rigdda.app.reports.wording import before, euros, percent, percentage, span, unchanged
 from rigdda.app.uncertainty.ground_band import Band
 from rigdda.barriers import describe, to_tables
@@ -49,6 +56,7 @@ from rigdda.envs.fence_checks import FenceCheck, demands
 from rigdda.envs.intervals import Estimate
 from rigdda.envs.problem import MET, MISSED, UNDECIDED
 from rigdda.envs.replay_record import release_record
+from rigdda.envs.ritchie_ditch import OUTSIDE
 from rigdda.replay.recording import Marks
 from rigdda.seeds import release_seeds
 
@@ -129,27 +137,27 @@ def chance_rows(done: DesignStudy) -> list[Row]:
 
     `reach` is the probability that a block of a release reaches the road, `failure` that a barrier
     fails; `_low` and `_high` are the ends of 95 % intervals, and `_bound` is a one-sided 95 % upper
-    bound. `cost` is the expected harm and repair of the event in EUR per metre and year.
+    bound. `failure` is empty if no barrier stands. `cost` is the expected harm and repair of the
+    event in EUR per metre and year.
     """
+    site = done.problem.site
+
+    def failure(found: Evaluation, event: str) -> Estimate | None:
+        return found.failure[event] if site.standing(found.layout) else None
+
     return [
         {
             "event": event.name,
             "design": event.design,
             "layout": case.name,
             "releases": case.evaluation.reach[event.name].releases,
-            **_chance("reach", case.evaluation.reach[event.name]),
-            **_chance("failure", case.evaluation.failure[event.name]),
+            **chance_columns("reach", case.evaluation.reach[event.name]),
+            **chance_columns("failure", failure(case.evaluation, event.name)),
             "cost": case.evaluation.by_event[event.name],
         }
-        for event in done.problem.site.events
+        for event in site.events
         for case in done.cases
     ]
-
-
-def _chance(name: str, estimate: Estimate) -> Row:
-    """Return a probability with the ends of its interval and its upper bound as columns."""
-    ends = _ends(name, (estimate.low, estimate.high))
-    return {name: estimate.probability, **ends, f"{name}_bound": estimate.bound}
 
 
 CHECK_FILES = ("checks.csv", "design_sheet.csv", "demand.csv", "demand.png")
@@ -294,6 +302,14 @@ def check_notes(checks: LayoutChecks) -> Iterator[str]:
     for check in checks.table:
         if not check.satisfied:
             yield f"not met: {check.barrier}, {check.check}: {check.note}"
+    for barrier, note in dict.fromkeys((c.barrier, c.note) for c in checks.table):
+        if OUTSIDE in note:
+            yield f"the checks of the {barrier} are not verified: {note}"
+    for barrier in dict.fromkeys(c.barrier for c in checks.table if "embankment" in c.barrier):
+        yield (
+            f"the {barrier} was not checked for the penetration of a block into its crest, nor for "
+            "the stability of its slopes and of the ground"
+        )
     for barrier in checks.idle:
         yield f"no block of the design events reaches the {barrier}"
 

@@ -43,7 +43,7 @@ from rigdda.app.reports.site_description import (
     site_differences,
     stated_assumptions,
 )
-from rigdda.app.reports.stations import PASSING_RATE
+from rigdda.app.reports.stations import PASSING_RATE, of_design_events
 from rigdda.app.reports.tables import RISKS
 from rigdda.app.reports.wording import (
     at_most,
@@ -268,8 +268,8 @@ def _chances(
             reach, bound = float(row["reach"]), float(row["reach_bound"])
             rest = f"at most {at_most(bound)}; {bare} {percent(float(earlier['reach']))}"
             yield f"“{row['event']}” reaches the road", percent(reach), rest
-            fails, bound = float(row["failure"]), float(row["failure_bound"])
             if name != without:
+                fails, bound = float(row["failure"]), float(row["failure_bound"])
                 yield f"A barrier fails in “{row['event']}”", percent(fails), (
                     f"at most {at_most(bound)}"
                 )  # fmt: skip
@@ -288,6 +288,8 @@ def _passing(folder: ResultsFolder) -> Iterator[Block]:
         if row["event"] == last and row["quantity"] == PASSING_RATE:
             own = {r["quantity"]: r for r in rows if r["x_m"] == row["x_m"] and r["event"] == last}
             lines.append(_station(row, own, what))
+    if folder.site is not None and len({row["event"] for row in rows}) > 1:
+        lines += [f"{line[0].upper()}{line[1:]}." for line in of_design_events(folder.site, rows)]
     if lines:
         yield Items(lines)
 

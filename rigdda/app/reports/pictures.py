@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import os
+import textwrap
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigdda import Barrier, Fence, Layout, Mesh, Run, Simulation, Site
+from rigdda import Barrier, Ditch, Fence, Layout, Mesh, Run, Simulation, Site
 from rigdda.app.reports.source_outlines import sources
 from rigdda.app.reports.stations import (
     ALL_EVENTS,
@@ -409,6 +410,15 @@ def section(
         save(figure, path)
 
 
+TITLE_WIDTH = 126
+"""Characters of a title over the whole width of a picture."""
+
+
+def _wrapped(title: str, width: int) -> str:
+    """Return a title with lines of at most `width` characters."""
+    return "\n".join(part for line in title.splitlines() for part in textwrap.wrap(line, width))
+
+
 SLOPES_PER_ROW = 3
 """Largest number of slopes side by side."""
 
@@ -436,13 +446,17 @@ def slopes(
     left, right, bottom, top = window
     columns = 2 if len(panels) == 4 else min(SLOPES_PER_ROW, len(panels))
     rows = -(-len(panels) // columns)
-    tall = min(13.0 / columns * (top - bottom) / (right - left), 7.0) + 0.6
+    titles = [_wrapped(panel.title, TITLE_WIDTH // columns) for panel in panels]
+    lines = 1 + max(title.count("\n") for title in titles)
+    tall = min(13.0 / columns * (top - bottom) / (right - left), 7.0) + 0.25 + 0.2 * lines
     with rc_context(FONT):
         figure = Figure((13.0, rows * tall + 1.2), dpi=DPI, layout="constrained")
         grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         drawn = list(zip(grid.flat, panels, strict=False))
-        labels = [_slope(axes, site, zone, panel, window) for axes, panel in drawn]
-        for axes, _ in drawn:
+        labels = []
+        for (axes, panel), title in zip(drawn, titles, strict=True):
+            labels.append(_slope(axes, site, zone, panel, window))
+            axes.set_title(title, loc="left", fontsize=11)
             axes.set(xlim=(left, right), ylim=(bottom, top))
             axes.label_outer()
         for axes in grid.flat[len(panels) :]:
@@ -504,9 +518,11 @@ def _slope(
 
     Return the labels of the barriers, which are written when the size of the axes is final.
     """
-    built, moved = earthworks(site.profile, site.standing(panel.layout), site.slope.surface)
+    standing = site.standing(panel.layout)
+    _, moved = earthworks(site.profile, standing, site.soil)
+    cut, _ = earthworks(site.profile, [b for b in standing if isinstance(b, Ditch)], site.soil)
     *_, bottom, top = window
-    draw_ground(axes, site, built, bottom)
+    draw_ground(axes, site, cut, bottom)
     axes.plot(*site.ground_between(site.road.start, site.road.end).T, color=ROAD, linewidth=5,
               zorder=3, solid_capstyle="butt")  # fmt: skip
     name_places(axes, site, (zone.start, zone.end))
@@ -624,7 +640,7 @@ def _key(figure: FigureBase, site: Site, events: Sequence[str], envelopes: bool 
 
     lines: list[Any] = []
     for name in events:
-        label = f"{name}, {site.event(name).rate:g} a year per 100 m"
+        label = f"{name}, {site.event(name).rate:.3g} a year per 100 m"
         lines.append(Line2D([], [], color=colour_of(site, name), linewidth=2, label=label))
     lines += [Patch(color=colour, label=name) for name, colour in materials(site).items()]
     lines += [

@@ -178,18 +178,19 @@ def draw(path: Path, result: Sensitivity) -> None:
 
 
 def _tornado(axes: Axes, output: Output, own: Sequence[tuple[Input, AnalysedInput]]) -> None:
-    """Draw bars of the average change about the mean of an output."""
+    """Draw bars of the average change of an output, half of it to each side of 0."""
     mean = float(output.response.values.mean())
     for y, (one, index) in enumerate(own):
         if isinstance(one, Parameter):
             half = 0.5 * index.change
-            axes.barh(y, -half, left=mean, color=LOW, height=0.7)
-            axes.barh(y, half, left=mean, color=HIGH, height=0.7)
-    axes.axvline(mean, color="black", linewidth=0.8)
+            axes.barh(y, -half, color=LOW, height=0.7)
+            axes.barh(y, half, color=HIGH, height=0.7)
+    axes.axvline(0.0, color="black", linewidth=0.8)
     axes.set_yticks(range(len(own)), [_labelled(one) for one, _ in own], fontsize=9)
     axes.set_ylim(len(own) - 0.5, -0.5)
-    unit = "" if output.unit == "-" else f" [{output.unit}]"
-    axes.set_title(f"{output.name}{unit}", loc="left", fontsize=10)
+    unit = "" if output.unit == "-" else f" {output.unit}"
+    title = f"{output.name}: average change, about a mean of {_number(mean)}{unit}"
+    axes.set_title(title, loc="left", fontsize=10)
     axes.grid(axis="x", alpha=0.25)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import msgspec
@@ -24,6 +25,7 @@ from rigdda.app.reports.wording import figure
 from rigdda.fields import described
 from rigdda.ground.grounds import GROUNDS, Span
 from rigdda.ground.prices import Consequences, Prices
+from rigdda.model.traffic import USUAL_VULNERABILITY
 
 PROPERTIES = {
     "friction_deg": ("friction angle", "deg"),
@@ -136,15 +138,27 @@ def price_blocks(site: Site) -> Iterator[Block]:
     yield _value_table("Prices of barriers", "price", site.prices)
     yield _value_table("Cost of rock on the road", "price", site.consequences)
     if site.traffic is not None:
-        yield _value_table("Traffic", "quantity", site.traffic)
+        usual: dict[str, Any] = {}
+        if site.traffic.run_into is None and site.traffic.decision_sight_distance is None:
+            usual["decision_sight_distance"] = round(site.traffic.stopping, 1)
+        if site.traffic.vulnerability is None:
+            usual["vulnerability"] = USUAL_VULNERABILITY
+        yield _value_table("Traffic", "quantity", site.traffic, usual)
 
 
-def _value_table(title: str, what: str, given: msgspec.Struct) -> Table:
-    """Return the table of values of a site file, each with its unit and whether it is a default."""
+def _value_table(
+    title: str, what: str, given: msgspec.Struct, computed: Mapping[str, Any] = MappingProxyType({})
+) -> Table:
+    """Return the table of values of a site file, each with its unit and whether it is a default.
+
+    `computed` has the values that are used for keys which are not given.
+    """
     usual = {field.name: _default(field) for field in msgspec.structs.fields(given)}
+    usual |= computed
     rows = []
     for field in described(type(given)):
         value = getattr(given, field.name)
+        value = computed.get(field.name) if value is None else value
         if field.name == "source" or value in ("", None):
             continue
         same = value == usual[field.name]
@@ -170,6 +184,8 @@ def _written(value: Any) -> str:
         return "; ".join(
             f"{name.replace('_', ' ')}: {_written(one)}" for name, one in value.items()
         )
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_written, value))}]"
     return f"{value:,.10g}" if isinstance(value, int | float) else str(value)
 
 

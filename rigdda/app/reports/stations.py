@@ -7,7 +7,8 @@ are those of a whole block, which is as long along the road as the root of its c
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+import shlex
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -468,6 +469,43 @@ def tables(rows: Rows) -> Iterator[tuple[str, Table]]:
             f"{_words(often, 'mean')} releases a year per 100 m of slope"
         )
         yield line, out
+
+
+FEW_PASSAGES = 20
+"""Number of passages of an event below which its 95 % quantile is not told."""
+
+
+def of_design_events(site: Site, rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what each design event does at each station, in words.
+
+    All events together are mostly small blocks, which say little about what a barrier must hold.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    rows : sequence of mapping
+        Rows of the table of stations, with numbers or with their text.
+    """
+    lines = []
+    for event in (event.name for event in site.events if event.design):
+        own = [row for row in rows if row["event"] == event]
+        for rate in (row for row in own if row["quantity"] == PASSING_RATE):
+            here = {row["quantity"]: row for row in own if row["x_m"] == rate["x_m"]}
+            count, where = int(rate["n"]), f"design event {event!r} at {float(rate['x_m']):g} m"
+            if count < FEW_PASSAGES:
+                passed = "1 block passes" if count == 1 else f"{count} blocks pass"
+                lines.append(
+                    f"{where}: only {passed} in {int(rate['releases']):,} releases; use "
+                    f"--event {shlex.quote(event)} to simulate this event alone"
+                )
+                continue
+            energy, height = (float(here[name]["q95"]) for name in ("energy", "height"))
+            lines.append(
+                f"{where}: 95 % of the {count:,} passing blocks have less than {figure(energy)} "
+                f"kJ, and the centres of 95 % are lower than {figure(height)} m above the ground"
+            )
+    return lines
 
 
 def _words(row: dict[str, Any], name: str) -> str:

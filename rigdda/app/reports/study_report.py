@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from rigdda import Layout, Site
 from rigdda.app.reports import pictures
-from rigdda.app.reports.tables import bounded, empty_table, risk_table, write_risks, write_rows
+from rigdda.app.reports.tables import (
+    bounded,
+    chance_columns,
+    empty_table,
+    risk_table,
+    write_risks,
+    write_rows,
+)
 from rigdda.app.reports.wording import euros, span
 from rigdda.envs.comparison import LEAST_PER_EVENT, Difference, difference_of_accounts
 from rigdda.envs.cost import Account, Facts, Risk, Sums, stratified
@@ -201,13 +208,8 @@ def event_rows(results: StudyResults) -> list[dict[str, Any]]:
     for one, name in itertools.product(results.layouts, results.site.event_names):
         row: dict[str, Any] = {"layout": one.name, "event": name}
         for words, failed in (("reach", False), ("failure", True)):
-            chance = one.chance(name, failed)
-            row |= {
-                words: chance.probability,
-                f"{words}_low": chance.low,
-                f"{words}_high": chance.high,
-                f"{words}_bound": chance.bound,
-            }
+            fallible = not failed or results.site.standing(one.layout)
+            row |= chance_columns(words, one.chance(name, failed) if fallible else None)
         row["energy_on_road_95"] = one.energy(name)
         row["energy_of_hit_95"] = one.energy(name, hit=True)
         row["harm_and_repair"] = results.sums(one).by_event[name]

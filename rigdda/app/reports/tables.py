@@ -405,6 +405,18 @@ def known_risks(study: ComparedLayouts) -> list[tuple[str, Risk]]:
     return [(c.name, c.evaluation.risk) for c in study.cases if c.evaluation.risk is not None]
 
 
+def chance_columns(name: str, chance: Estimate | None) -> dict[str, float]:
+    """Return a probability, the ends of its 95 % interval and its upper bound as columns.
+
+    They are empty without a probability, as that of a failure where no barrier stands.
+    """
+    names = (name, f"{name}_low", f"{name}_high", f"{name}_bound")
+    if chance is None:
+        return dict.fromkeys(names, math.nan)
+    values = (chance.probability, chance.low, chance.high, chance.bound)
+    return dict(zip(names, values, strict=True))
+
+
 def bounded(estimate: Estimate) -> str:
     """Return a probability with its upper bound, rounded up, as text; "-" without releases."""
     if not estimate.releases:

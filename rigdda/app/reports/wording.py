@@ -7,9 +7,12 @@ from collections.abc import Sequence
 from decimal import Decimal
 from typing import Any
 
-from rigdda import Barrier, Mesh, Site
+from rigdda import Barrier, Ditch, Mesh, Site
 from rigdda.barriers import Removal
 from rigdda.rounding import Rounding, rounded
+
+STEEP_CUT = 1.0
+"""Height by which the uphill side of a ditch exceeds its depth from which on it is told [m]."""
 
 
 def order(barrier: Barrier, site: Site) -> str:
@@ -27,6 +30,10 @@ def order(barrier: Barrier, site: Site) -> str:
     if abs(above) >= 1.0:
         place += f" and {above:.0f} m above it" if above > 0.0 else f" and {-above:.0f} m below it"
     sizes, room = barrier.order(road.start)
+    if isinstance(barrier, Ditch):
+        cut, floor = barrier.cut(ground)
+        if cut > barrier.depth + STEEP_CUT:
+            sizes = f"with a cut of {cut:.1f} m on its uphill side and a floor {floor:.1f} m wide"
     return ", ".join(filter(None, (barrier.label, sizes, place))) + room
 
 

@@ -194,8 +194,9 @@ def _run_outs(rows: Sequence[Row], site: Site) -> list[DataSet]:
         value = _number(row, "run_out_m", site.slope.points[0][0], site.slope.points[-1][0])
         if value > site.road.end:
             hint = (
-                "move road.end beyond it: computed run-outs are cut off at "
-                f"{chainage(site.road.end)} m"
+                "computed run-outs are cut off at the end of the road, "
+                f"{chainage(site.road.end)} m: fit a copy of the site file in which the road ends "
+                "beyond all observed stops"
             )
             raise BadInput(f"{row[0]} run_out_m", value, hint)
         found.setdefault(row[1]["event"], []).append(value)

@@ -598,10 +598,12 @@ class _Draft:
             f"{key} = {span.typical:g}  # plausible {span.low:g} to {span.high:g}: {span.source}"
             for key, span in spans.items()
         ]
+        sure = GIVEN if name in self.named else PLACEHOLDER
+        sure = CHECK_DEFAULT if name == "concrete" and sure != GIVEN else sure
         return Part(
             f"[surfaces.{_key(name)}]",
             Surface,
-            {"ground": (self.surfaces[name], GIVEN if name in self.named else PLACEHOLDER)},
+            {"ground": (self.surfaces[name], sure)},
             (f"{ground.words}; give what you know better in place of these values:", *lines),
         )
 

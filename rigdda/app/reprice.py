@@ -1,6 +1,6 @@
 """Answers for other prices, consequences, rates, caps and targets from the outcomes of a design.
 
-Nothing is simulated. Costs and probabilities are computed from the stored outcomes as a design
+No layout is simulated. Costs and probabilities are computed from the stored outcomes as a design
 computes them. Z is the sum of the means of the events, each times the rate of the event. Another
 rate therefore only changes the weight of a mean; the releases need no weights of their own. Only if
 a layout has fewer than two releases per event on average, each release is weighted by the new rate
@@ -29,6 +29,7 @@ from rigdda.app import archive
 from rigdda.app.archive import Archive
 from rigdda.app.barrier_checks import check_layout
 from rigdda.app.design_study import ComparedLayouts, VerifiedLayout
+from rigdda.barriers import standing
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.barrier_formulas import BarrierCheck
 from rigdda.envs.cost import account, judge
@@ -61,7 +62,7 @@ LABELS = ("name", "description", "family", "origin", "lumped")
 
 
 class Change(NamedTuple):
-    """A value of a site file that was changed; `unit` says what a return period refers to."""
+    """A value of a site file that was changed, with its unit if it is a return period."""
 
     path: str
     before: Any
@@ -135,6 +136,8 @@ def with_settings(site: Site, settings: Mapping[str, Value]) -> tuple[Site, tupl
         stem, _, key = path.rpartition(".")
         period, length = f"{stem}.{PERIOD}", settings.get(f"{stem}.{LENGTH}")
         before = _present(site, path, value)
+        if key == "rate" and period in settings:
+            raise BadInput(path, value, f"leave it out: {period} gives the rate, too")
         if not path.startswith("events.") or key not in (PERIOD, LENGTH):
             changes.append(Change(path, before, value))
             site = _with(site, path, {}, value)
@@ -144,8 +147,8 @@ def with_settings(site: Site, settings: Mapping[str, Value]) -> tuple[Site, tupl
             rate = _present(site, f"{stem}.rate", value)
             site = _with(site, path, {} if length is None else {LENGTH: length}, value)
             metres = SECTION if length is None else length  # a number, or _with refuses it
-            before = SECTION / (rate * metres) if rate else math.inf
-            changes.append(Change(path, before, value, f" years on {metres:g} m of slope"))
+            before = SECTION / (rate * metres) if rate else "never"
+            changes.append(Change(path, before, value, f"years on {metres:g} m of slope"))
     return site, tuple(changes)
 
 
@@ -212,15 +215,16 @@ def _present(site: Site, path: str, value: Value) -> Any:
     return found
 
 
-def _with(site: Site, path: str, more: Mapping[str, Value], value: Value) -> Site:
-    """Return a site with one other value, and `more` values of the same table."""
+def _with(site: Site, path: str, others: Mapping[str, Value], value: Value) -> Site:
+    """Return a site with one other value, and with `others` in the same table."""
     top, keys = _table_of(site, path, value)
     table: Any = getattr(site, top)
     if not isinstance(table, tuple):
-        return msgspec.structs.replace(site, **{top: _changed(table, path, top, keys, more, value)})
+        new = _changed(table, path, top, keys, others, value)
+        return msgspec.structs.replace(site, **{top: new})
     index, keys = _named(site, path, value, top)
     where = f"{top}.{table[index].name}"
-    new = _changed(table[index], path, where, keys, more, value)
+    new = _changed(table[index], path, where, keys, others, value)
     return msgspec.structs.replace(site, **{top: (*table[:index], new, *table[index + 1 :])})
 
 
@@ -229,11 +233,11 @@ def _changed(
     path: str,
     where: str,
     keys: Sequence[str],
-    more: Mapping[str, Value],
+    others: Mapping[str, Value],
     value: Value,
 ) -> msgspec.Struct:
-    """Return a table of a site with one other value, and `more` values."""
-    found = {k: v for k, v in msgspec.to_builtins(table).items() if v is not None} | dict(more)
+    """Return a table of a site with one other value, and with `others`."""
+    found = {k: v for k, v in msgspec.to_builtins(table).items() if v is not None} | dict(others)
     if keys[0] == PERIOD:
         found.pop("rate")
     inner = found
@@ -356,7 +360,10 @@ def reprice(
     targets: Targets | Mapping[str, float | None] | None = None,
     max_cost: float | None = None,
 ) -> Repriced:
-    """Return the results of a design for other values, without simulation.
+    """Return the results of a design for other values, without simulating a layout.
+
+    The demand on barriers is simulated if it is not stored, for example if other events are design
+    events.
 
     Parameters
     ----------
@@ -373,6 +380,8 @@ def reprice(
     ------
     BadInput
         If the folder contains no completed design, or a setting is invalid.
+    Diverged
+        If a simulation of the demand diverges.
     """
     kept = archive.read(Path(results))
     site, changes = with_settings(kept.site, settings or {})
@@ -381,13 +390,13 @@ def reprice(
     problem = ArchivedProblem(kept, site, asked, most)
     found = _candidates(problem, kept)
     required = kept.checks == "required"
-    field = [
-        c
-        for c in found.values()
-        if problem.place.too_expensive(c.layout) is None
-        and not (required and failed_checks(problem, c.layout, kept))
+    failed = {layout: failed_checks(problem, layout, kept) for layout in found}
+    candidates = [
+        one
+        for one in found.values()
+        if problem.place.too_expensive(one.layout) is None and not (required and failed[one.layout])
     ]
-    best, evaluation = choose(problem, field, kept)
+    best, evaluation = choose(problem, candidates, kept)
     cases = []
     for name, tables in zip(kept.names, kept.layouts, strict=True):
         layout = archive.layout_of(tables)
@@ -399,34 +408,51 @@ def reprice(
             replace(one, verified=judged(problem, found[one.layout], kept))
             if found[one.layout].verified
             else one
-            for one in frontier([c.tried for c in field if c.tried is not None])
+            for one in frontier([c.tried for c in candidates if c.tried is not None])
         )
     return Repriced(
         problem=problem,
         cases=tuple(cases),
         changes=changes,
         verified=best.verified,
-        tried=len(field),
+        tried=len(candidates),
         frontier=front,
         required=required,
-        failed={c.name: failed_checks(problem, c.evaluation.layout, kept) for c in cases},
+        failed={case.name: failed[case.evaluation.layout] for case in cases},
     )
 
 
 def failed_checks(
     problem: DesignProblem, layout: Layout, kept: Archive
 ) -> tuple[BarrierCheck, ...]:
-    """Return the checks that the barriers of a layout do not meet.
+    """Return the checks that the new barriers of a layout do not meet.
 
     The demand is that of the slope as it stands. Only for the layout that the design found, it is
-    also computed below the other barriers, as in the design.
+    that below the other barriers, as in the design, which has stored it.
+
+    Parameters
+    ----------
+    problem : DesignProblem
+        The problem with the new values.
+    layout : tuple of Barrier
+        The layout.
+    kept : Archive
+        The archive of the design.
+
+    Raises
+    ------
+    Diverged
+        If a simulation of the demand diverges.
     """
-    found = (problem.place.failed_check(barrier) for barrier in layout)
-    failed = tuple(check for check in found if check is not None)
-    if failed and layout == archive.layout_of(kept.layouts[-1]):
+    if layout == archive.layout_of(kept.layouts[-1]):
+        # the new cap does not apply here
         free = DesignProblem(problem.site, kept.max_barriers, kept.kinds, zone=kept.zone)
-        return check_layout(free, layout).failed  # a new cap does not apply to the comparison
-    return failed
+        own = standing(layout)
+        checks = check_layout(free, layout).failed
+        return tuple(c for c in checks if any(c.barrier == b.label and c.x == b.x for b in own))
+    return tuple(
+        check for barrier in standing(layout) for check in problem.place.failed_checks(barrier)
+    )
 
 
 def _merged(before: Targets, given: Mapping[str, float | None]) -> Targets:
@@ -553,7 +579,7 @@ SHORTLIST = 40
 def choose(
     problem: DesignProblem, candidates: Sequence[ScoredLayout], kept: Archive
 ) -> tuple[ScoredLayout, Evaluation]:
-    """Return the best candidate and its evaluation.
+    """Return the best of candidates that may be built, and its evaluation.
 
     Among those that meet the targets, it is the one with the lowest Z. A layout that was not
     verified counts with the upper end of the 95 % interval of Z instead, so that no layout is

@@ -37,6 +37,7 @@ LONG = 2.0
 
 
 Range = tuple[float, float]
+"""Least and greatest value."""
 
 
 class Trial(NamedTuple):

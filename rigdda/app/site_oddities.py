@@ -14,6 +14,7 @@ import shapely
 from rigdda import Event, Site, Source
 from rigdda.app.site_check import Trial, blocks_of, joint_scale
 from rigdda.barriers.fence import FENCE_CLASSES
+from rigdda.envs.barrier_formulas import mean_scene
 from rigdda.fields import Described, described, parse
 from rigdda.files import read
 from rigdda.ground.grounds import GROUNDS
@@ -72,9 +73,8 @@ SIZE_LIMITS = {"height": "max_height", "depth": "max_depth", "width": "max_width
           "thickness": "max_thickness"}  # fmt: skip
 """Limits of the zone for sizes of barriers."""
 
-GRIP = 5.0
-"""Difference between the friction angles of the ground and of rock from which on the base friction
-of a wall is doubted [deg]."""
+DOUBTED_BASE_FRICTION = 5.0
+"""Base friction of a wall above that of its own surface which is doubted [deg]."""
 
 DOUBTED_PRICE_FACTOR = 20.0
 """Factor above or below a usual price beyond which its unit is doubted."""
@@ -278,22 +278,27 @@ def _odd_zone(site: Site) -> Iterator[str]:
 
 
 def _odd_foundation(site: Site) -> Iterator[str]:
-    """Yield what the ground of the zone lacks for the price of a ditch and the base of a wall."""
+    """Yield missing prices of excavation, and doubtful friction under walls, in the zone."""
     zone, prices = site.barrier_zone, site.prices.ditch
     points, names = site.slope.chain()
-    ends = zip(points, points[1:], names, strict=False)
-    ground = dict.fromkeys(n for (a, _), (b, _), n in ends if a < zone.end and b > zone.start)
+    parts = zip(points, points[1:], names, strict=False)
+    ground = dict.fromkeys(
+        name for (a, _), (b, _), name in parts if min(a, b) < zone.end and max(a, b) > zone.start
+    )
     for name in ground:
         if name not in prices:
             yield (
                 f"prices.ditch has no price for {name!r}: a ditch there costs as much as in the "
-                f"most expensive ground, {max(prices.values()):g} EUR/m3; add "
-                f"{chr(34)}{name}{chr(34)} = PRICE to it"
+                f"most expensive ground, {max(prices.values()):g} EUR/m3; add a price for it"
             )
-    own = site.surfaces["rock"].friction_deg
-    for name in ground if "concrete" not in site.surfaces else ():
-        base = site.surfaces[name].friction_deg
-        if base > own + GRIP:
+    scene = mean_scene(site)
+    wall = scene.barrier_surface
+    if wall == "concrete" or wall not in scene.surfaces:
+        return
+    usual = scene.surfaces[wall].friction_deg + DOUBTED_BASE_FRICTION
+    for name in ground:
+        base = scene.friction_deg(wall, name)
+        if base > usual:
             yield (
                 f"surfaces has no concrete: a gravity wall stands on {name!r} with a base friction "
                 f"of {base:g} deg, which describes impacts of blocks; add [surfaces.concrete] with "

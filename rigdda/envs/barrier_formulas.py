@@ -9,10 +9,10 @@ and the depth of Ritchie.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Site, limit_equilibrium
+from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Scene, Site, limit_equilibrium
 from rigdda.barriers import section
 from rigdda.barriers.base import ELEMENT, surfaces_below
 from rigdda.barriers.gravity_wall import SLID
@@ -176,10 +176,7 @@ class Base(NamedTuple):
     @classmethod
     def of(cls, site: Site, barrier: GravityWall | Embankment) -> Base:
         """Return how a barrier stands on the ground of a site."""
-        # checks use the mean values of the surfaces, not those of a release
-        drawn = site.draw(0, site.event_names[0])
-        drawn = drawn._replace(strengths=(), friction_deg=0.0, roughness=None)
-        scene = site.scene(drawn, site.built(site.as_built((barrier,)), drawn.width))
+        scene = mean_scene(site, (barrier,))
         outline, gravity = scene.outline(0), -scene.gravity_vector[1]
         wall = isinstance(barrier, GravityWall)
         own = scene.barrier_surface if wall else scene.fill
@@ -195,6 +192,16 @@ class Base(NamedTuple):
             restitution=scene.interface(touched, own).restitution or 0.0,
             gravity=gravity,
         )
+
+
+def mean_scene(site: Site, layout: Sequence[Barrier] = ()) -> Scene:
+    """Return a scene of a site in which the ground has its mean properties and no pits.
+
+    Checks use it, because those of a release vary at random.
+    """
+    drawn = site.draw(0, site.event_names[0])
+    drawn = drawn._replace(strengths=(), friction_deg=0.0, roughness=None)
+    return site.scene(drawn, site.built(site.as_built(layout), drawn.width))
 
 
 def design_impact(action: Action, height: float, restitution: float) -> Impact:
@@ -237,7 +244,7 @@ def _stands(
 def _ditch(site: Site, ditch: Ditch) -> Iterator[BarrierCheck]:
     """Yield the comparison of a ditch with that of Ritchie."""
     ritchie = RitchieDitch.of(site)
-    note = f"Ritchie, {ritchie.height:.0f} m high at {ritchie.inclination:.0f} deg"
+    note = f"Ritchie, cut {ritchie.height:.0f} m high at {ritchie.inclination:.0f} deg"
     note += f"; {ritchie.caveat}" if ritchie.caveat else ""
     head = ditch.label, ditch.x
     yield BarrierCheck(*head, "width", ritchie.width, ditch.width, "m", 1.0, note)

@@ -33,8 +33,8 @@ CHART_COLUMNS = (10.0, 20.0, 30.0)
 INCLINATIONS = (40.0, 90.0)
 """Inclinations for which the chart applies [deg]: half the distance of two rows beyond its ends."""
 
-OUTSIDE = "outside the range of the chart"
-"""What a check of a ditch says of a cut that the chart does not cover."""
+OUTSIDE_CHART = "outside the range of the chart"
+"""Words for a cut that the chart does not cover."""
 
 CHART_HEIGHTS = (5.0, 40.0)
 """Heights of cuts for which the chart applies [m]. Ritchie's tests reached about 40 m."""
@@ -79,7 +79,7 @@ class RitchieDitch(NamedTuple):
             words.append(f"inclination {self.inclination:.0f} deg")
         if not CHART_HEIGHTS[0] <= self.height <= CHART_HEIGHTS[1]:
             words.append(f"height {self.height:.0f} m")
-        return f"{OUTSIDE}: {', '.join(words)}" if words else ""
+        return f"{OUTSIDE_CHART}: {', '.join(words)}" if words else ""
 
     def name_of(self, ditch: Ditch) -> str:
         """Return the name of a ditch in tables: that of Ritchie only if it is as large."""

@@ -89,7 +89,7 @@ class Rules:
         checks: str = "reported",
     ):
         self.site, self.zone, self.max_cost, self.checks = site, zone, max_cost, checks
-        self._failed: dict[Barrier, BarrierCheck | None] = {}
+        self._failed: dict[Barrier, tuple[BarrierCheck, ...]] = {}
         cut = [(max(low, zone.start), min(high, zone.end)) for low, high in site.rooms]
         self.parts = [(low, high) for low, high in cut if low < high]
         if not self.parts:
@@ -266,23 +266,28 @@ class Rules:
             yield from self._failed_checks(where, barrier)
         return start, end
 
-    def failed_check(self, barrier: Barrier) -> BarrierCheck | None:
-        """Return the first check that a barrier fails, None if it meets all.
+    def failed_checks(self, barrier: Barrier) -> tuple[BarrierCheck, ...]:
+        """Return the checks that a barrier does not meet.
 
-        The demand is that of the slope as it stands, without other new barriers.
+        The demand is that of the slope as it stands, without other new barriers. It is simulated if
+        it is not stored.
+
+        Raises
+        ------
+        Diverged
+            If a simulation diverges.
         """
         if barrier not in self._failed:
             if len(self._failed) >= MOST_KNOWN:
                 self._failed.clear()
             demand = demand_at(self._envelope, self.site.rule, barrier.x)
             found = checks_of(self.site, barrier, demand)
-            self._failed[barrier] = next((c for c in found if not c.satisfied), None)
+            self._failed[barrier] = tuple(check for check in found if not check.satisfied)
         return self._failed[barrier]
 
     def _failed_checks(self, where: str, barrier: Barrier) -> Iterator[BadInput]:
         """Yield an error if a barrier fails a check of its kind."""
-        failed = self.failed_check(barrier)
-        if failed is not None:
+        for failed in self.failed_checks(barrier)[:1]:
             hint = (
                 f"satisfy the check of {failed.check}, {failed.demand:.4g} of "
                 f"{failed.capacity:.4g} {failed.unit}, or report the checks only"

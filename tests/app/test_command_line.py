@@ -244,6 +244,25 @@ def test_simulate_writes_what_it_says(toml: Path, tmp_path: Path) -> None:
         assert name in words
 
 
+def test_a_ditch_in_the_crest_of_an_embankment_is_drawn(tmp_path: Path) -> None:
+    """It may not be built, but is simulated as given."""
+    layout = (rigdda.Embankment(11.3, 4.0, 3.0), rigdda.Ditch(12.55, 1.0, 1.0))
+    rigdda.save_layout(layout, tmp_path / "layout.toml")
+    options = ("--layout", "layout.toml", "--releases", 6, "--out", "o")
+    told = run_told("simulate", "quick", *options, folder=tmp_path)
+    assert "may not be built" in f"{told}"
+    assert png_size(tmp_path / "o/section.png")[0] > 900
+
+
+def test_a_design_of_nothing_has_a_report(tmp_path: Path) -> None:
+    tiny = ("--budget", 60, "--verify", 30, "--ground-samples", 0, "--max-cost", 0)
+    run("design", "quick", *tiny, "--out", "o", folder=tmp_path)
+    table = rows(tmp_path / "o/chances.csv")
+    assert table and {row["failure"] for row in table if row["layout"] == "nothing"} == {""}
+    run("report", "o", "--out", "page", folder=tmp_path)
+    assert "Build nothing" in (tmp_path / "page/report.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.slow
 def test_simulate_takes_every_kind(toml: Path, tmp_path: Path) -> None:
     layout = (

@@ -721,6 +721,23 @@ def test_the_volume_of_a_release_is_in_the_range_that_the_check_tells(name):
             assert least * (1 - slack) <= outcome.released_volume <= most * (1 + slack)
 
 
+def test_a_site_without_a_surface_of_rock_is_checked(slope):
+    names = {"rock": "granite"}
+    surfaces = {names.get(name, name): one for name, one in slope.surfaces.items()}
+    ground = replace(
+        slope.slope,
+        surface=names.get(slope.slope.surface, slope.slope.surface),
+        surfaces=tuple(
+            replace(part, surface=names.get(part.surface, part.surface))
+            for part in slope.slope.surfaces
+        ),
+    )
+    sources = tuple(replace(source, surface="granite") for source in slope.sources)
+    other = replace(slope, surfaces=surfaces, slope=ground, sources=sources)
+    told = oddities(other)
+    assert any(line.startswith("prices.ditch has no price for 'granite'") for line in told)
+
+
 def test_releases_that_are_cut_off_look_odd(slope):
     name = slope.event_names[0]
     line = oddities(slope, [Trial(name, 0.1, True)])

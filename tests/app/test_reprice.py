@@ -18,7 +18,7 @@ from rigdda import MECHANICS, BadInput, Outcome, Site
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.app import archive, design, reprice
 from rigdda.app.barrier_checks import check_layout
-from rigdda.app.reports import design_report
+from rigdda.app.reports import design_report, reprice_report
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation, ensemble
 from rigdda.envs.cost import judge
@@ -262,7 +262,10 @@ def test_a_return_period_is_compared_on_the_same_length(designed: Path) -> None:
         (event,) = (event for event in site.events if event.name == "block")
         assert event.rate == pytest.approx(100.0 / (4.0 * 180.0))
         assert change.before == pytest.approx(100.0 / (rate * 180.0))
-        assert "180 m" in change.unit
+        words = reprice_report.changed(change)
+        assert words.startswith(f"{path} = 4 years on 180 m of slope (was ")
+    with pytest.raises(BadInput, match="return_period"):
+        reprice.with_settings(kept.site, {"events.block.rate": 1.0, path: 4.0})
 
 
 def test_the_command_answers_in_a_folder_of_its_own(designed: Path, tmp_path: Path) -> None:
@@ -282,7 +285,7 @@ def test_the_command_answers_in_a_folder_of_its_own(designed: Path, tmp_path: Pa
         for row in design_report.frontier_rows(done.frontier)
     ]
     assert "consequences.closure = 20000 (was 50,000)" in words
-    assert "nothing was simulated" in words and "best of search" in words
+    assert "no layout was simulated" in words and "best of search" in words
     assert {p.name: p.read_bytes() for p in designed.iterdir() if p.is_file()} == before
 
 

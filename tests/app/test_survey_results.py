@@ -97,6 +97,19 @@ def test_a_barrier_to_order_has_its_place_on_the_survey(site: Site, tmp_path: Pa
     }
 
 
+def test_the_order_of_a_ditch_on_a_slope_tells_its_cut() -> None:
+    bench = Site.load("bench")
+    ditch = rigdda.Ditch(27.5, 3.0, 8.0, 0.25)
+    rise = bench.profile.height(ditch.x) - bench.profile.height(ditch.end)
+    cut, floor = ditch.cut(bench.profile)
+    assert cut == pytest.approx(3.0 + rise)
+    assert floor == pytest.approx(8.0 - 0.25 * (2.0 * 3.0 + rise))
+    words = f"with a cut of {cut:.1f} m on its uphill side and a floor {floor:.1f} m wide"
+    assert rise > 1.0 and words in order(ditch, bench)
+    flat = Site.load("verge")
+    assert "cut of" not in order(rigdda.Ditch(6.0, 1.0, 4.0, 0.25), flat)
+
+
 def test_tables_of_risk_are_only_there_with_traffic(bare: Site, tmp_path: Path) -> None:
     busy = msgspec.structs.replace(bare, traffic=rigdda.Traffic(8000.0, 80.0, 250.0))
     layouts = {"nothing": (), "fence": (FENCE,)}

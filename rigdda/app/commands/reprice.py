@@ -46,7 +46,7 @@ def reprice(
 ) -> None:
     """Evaluate the design in the folder RESULTS again with other prices, rates, targets or caps.
 
-    Nothing is simulated: the outcomes of all releases of the design are evaluated with the new
+    No layout is simulated: the outcomes of all releases of the design are evaluated with the new
     values. The last row of the table is the best of all layouts that the search evaluated; if the
     design required checks, only layouts whose barriers meet them are considered. Keys on which the
     motion of rock depends are refused.
@@ -69,7 +69,8 @@ def reprice(
         reprice_report.write(done, folder)
     for change in done.changes:
         click.echo(reprice_report.changed(change))
-    click.echo(f"{findings.headline(reprice_report.answer(done))}\n")
+    line = findings.headline(reprice_report.answer(done))
+    (click.echo if line.startswith("Build") else finding)(f"{line}\n")
     show(tables.costs(done))
     chances = tables.chances(done)
     if chances is not None:
@@ -87,4 +88,4 @@ def reprice(
         click.echo(f"  {line}")
     for line in reprice_report.sentences(done):
         finding(line)
-    click.echo(f"nothing was simulated; the results are in {folder}")
+    click.echo(f"no layout was simulated; the results are in {folder}")

@@ -369,7 +369,7 @@ def figures_html(found: LiveFigures, bad: str, quiet: str) -> str:
     rows = []
     for row in found.events:
         ends = f"{100 * row['reach_low']:.2f} to {100 * row['reach_high']:.2f}"
-        fails = f"{100 * row['failure']:.2f}" if found.layout else "-"
+        fails = "-" if math.isnan(row["failure"]) else f"{100 * row['failure']:.2f}"
         rows.append(
             (row["event"], f"{100 * row['reach']:.2f}", ends, fails, f"{row['releases']:,}")
         )

@@ -56,7 +56,7 @@ from rigdda.envs.fence_checks import FenceCheck, demands
 from rigdda.envs.intervals import Estimate
 from rigdda.envs.problem import MET, MISSED, UNDECIDED
 from rigdda.envs.replay_record import release_record
-from rigdda.envs.ritchie_ditch import OUTSIDE
+from rigdda.envs.ritchie_ditch import OUTSIDE_CHART
 from rigdda.replay.recording import Marks
 from rigdda.seeds import release_seeds
 
@@ -302,14 +302,15 @@ def check_notes(checks: LayoutChecks) -> Iterator[str]:
     for check in checks.table:
         if not check.satisfied:
             yield f"not met: {check.barrier}, {check.check}: {check.note}"
-    for barrier, note in dict.fromkeys((c.barrier, c.note) for c in checks.table):
-        if OUTSIDE in note:
-            yield f"the checks of the {barrier} are not verified: {note}"
-    for barrier in dict.fromkeys(c.barrier for c in checks.table if "embankment" in c.barrier):
-        yield (
-            f"the {barrier} was not checked for the penetration of a block into its crest, nor for "
-            "the stability of its slopes and of the ground"
-        )
+    for barrier, x, note in dict.fromkeys((c.barrier, c.x, c.note) for c in checks.table):
+        if OUTSIDE_CHART in note:
+            yield f"the checks of the {barrier}, at {x:.1f} m, are not verified: {note}"
+    for barrier, x in dict.fromkeys((c.barrier, c.x) for c in checks.table):
+        if "embankment" in barrier:
+            yield (
+                f"the {barrier}, at {x:.1f} m, was not checked for the penetration of a block into "
+                "its crest, nor for the stability of its slopes and of the ground"
+            )
     for barrier in checks.idle:
         yield f"no block of the design events reaches the {barrier}"
 

@@ -100,11 +100,6 @@ def headline(answer: DesignAnswer) -> str:
         return f"Build nothing: no layout was found that {worth} its cost."
     if fails:
         return f"Do not build this as it is: {layout}.{fails}"
-    if not answer.verified:
-        return (
-            f"Verify with a new design before you build: {layout}. Its Z is that of the releases "
-            "by which it was chosen."
-        )
     if answer.targets not in (None, MET):
         return (
             f"Verify with more releases before you build: {layout}. These releases do not decide "
@@ -120,6 +115,11 @@ def headline(answer: DesignAnswer) -> str:
         return (
             f"Build nothing: the best layout that was found costs {euros(more)} EUR per metre and "
             f"year more than {answer.bare}: {layout}."
+        )
+    if not answer.verified:
+        return (
+            f"Verify with a new design before you build: {layout}. Its Z is that of the releases "
+            "by which it was chosen."
         )
     if answer.z[2] >= answer.nothing[1] and answer.targets is None:
         return (

@@ -268,7 +268,7 @@ def _chances(
             reach, bound = float(row["reach"]), float(row["reach_bound"])
             rest = f"at most {at_most(bound)}; {bare} {percent(float(earlier['reach']))}"
             yield f"“{row['event']}” reaches the road", percent(reach), rest
-            if name != without:
+            if name != without and row["failure"]:  # it is empty if no barrier stands
                 fails, bound = float(row["failure"]), float(row["failure_bound"])
                 yield f"A barrier fails in “{row['event']}”", percent(fails), (
                     f"at most {at_most(bound)}"

@@ -16,7 +16,8 @@ import os
 import textwrap
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -24,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigdda import Barrier, Ditch, Fence, Layout, Mesh, Run, Simulation, Site
+from rigdda import BadInput, Barrier, Ditch, Fence, Layout, Mesh, Run, Simulation, Site
 from rigdda.app.reports.source_outlines import sources
 from rigdda.app.reports.stations import (
     ALL_EVENTS,
@@ -396,7 +397,7 @@ def section(
         upper, lower = parts
         grid = upper.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         labels = []
-        for axes, panel in zip(grid.flat, panels, strict=True):
+        for axes, panel in zip(grid.flat, _wrapped(panels, columns), strict=True):
             labels.append(_slope(axes, site, zone, panel, window))
             axes.set(xlim=(left, right), ylim=(bottom, top))
             axes.label_outer()
@@ -411,12 +412,16 @@ def section(
 
 
 TITLE_WIDTH = 126
-"""Characters of a title over the whole width of a picture."""
+"""Number of characters of a title across a whole picture."""
 
 
-def _wrapped(title: str, width: int) -> str:
-    """Return a title with lines of at most `width` characters."""
-    return "\n".join(part for line in title.splitlines() for part in textwrap.wrap(line, width))
+def _wrapped(panels: Sequence[Panel], columns: int) -> list[Panel]:
+    """Return panels whose titles have lines that fit into one of several columns."""
+    width, found = TITLE_WIDTH // columns, []
+    for panel in panels:
+        lines = (part for line in panel.title.splitlines() for part in textwrap.wrap(line, width))
+        found.append(replace(panel, title="\n".join(lines)))
+    return found
 
 
 SLOPES_PER_ROW = 3
@@ -446,17 +451,16 @@ def slopes(
     left, right, bottom, top = window
     columns = 2 if len(panels) == 4 else min(SLOPES_PER_ROW, len(panels))
     rows = -(-len(panels) // columns)
-    titles = [_wrapped(panel.title, TITLE_WIDTH // columns) for panel in panels]
-    lines = 1 + max(title.count("\n") for title in titles)
+    panels = _wrapped(panels, columns)
+    lines = 1 + max(panel.title.count("\n") for panel in panels)
     tall = min(13.0 / columns * (top - bottom) / (right - left), 7.0) + 0.25 + 0.2 * lines
     with rc_context(FONT):
         figure = Figure((13.0, rows * tall + 1.2), dpi=DPI, layout="constrained")
         grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         drawn = list(zip(grid.flat, panels, strict=False))
         labels = []
-        for (axes, panel), title in zip(drawn, titles, strict=True):
+        for axes, panel in drawn:
             labels.append(_slope(axes, site, zone, panel, window))
-            axes.set_title(title, loc="left", fontsize=11)
             axes.set(xlim=(left, right), ylim=(bottom, top))
             axes.label_outer()
         for axes in grid.flat[len(panels) :]:
@@ -519,10 +523,12 @@ def _slope(
     Return the labels of the barriers, which are written when the size of the axes is final.
     """
     standing = site.standing(panel.layout)
-    _, moved = earthworks(site.profile, standing, site.soil)
-    cut, _ = earthworks(site.profile, [b for b in standing if isinstance(b, Ditch)], site.soil)
+    built, moved = earthworks(site.profile, standing, site.soil)
+    ditches = [barrier for barrier in standing if isinstance(barrier, Ditch)]
+    with suppress(BadInput):  # a ditch in an embankment cannot be dug without it
+        built, _ = earthworks(site.profile, ditches, site.soil)
     *_, bottom, top = window
-    draw_ground(axes, site, cut, bottom)
+    draw_ground(axes, site, built, bottom)
     axes.plot(*site.ground_between(site.road.start, site.road.end).T, color=ROAD, linewidth=5,
               zorder=3, solid_capstyle="butt")  # fmt: skip
     name_places(axes, site, (zone.start, zone.end))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -54,13 +55,14 @@ def _row(done: Repriced, name: str, e: Evaluation) -> dict[str, Any]:
         "meets_checks": not done.failed[name],
     }
     site = done.problem.site
+    stands = bool(site.standing(e.layout))
     if any(event.design for event in site.events):
         one = TriedLayout.of(site, e)
         row |= {
             "reach": one.reach.probability,
             "reach_bound": one.level,
-            "failure": one.failure.probability,
-            "failure_bound": one.failure.bound,
+            "failure": one.failure.probability if stands else math.nan,
+            "failure_bound": one.failure.bound if stands else math.nan,
         }
     return row
 
@@ -68,7 +70,8 @@ def _row(done: Repriced, name: str, e: Evaluation) -> dict[str, Any]:
 def changed(change: Change) -> str:
     """Return a change in words."""
     before = "default" if change.before is None else number(change.before)
-    return f"{change.path} = {number(change.after)} (was {before}){change.unit}"
+    after = " ".join(filter(None, (number(change.after), change.unit)))
+    return f"{change.path} = {after} (was {before})"
 
 
 def answer(done: Repriced) -> findings.DesignAnswer:
@@ -107,8 +110,11 @@ def sentences(done: Repriced) -> list[str]:
         lines.append(f"{BEST_OF_SEARCH!r} fails its checks: {words}")
     lines += findings.over_the_cap(done.problem, cases)
     comparable = [(case.name, case.evaluation) for case in done.comparable]
-    names = {name for name, _ in comparable}
-    lines += findings.compared_only([name for name, _ in cases if name not in names])
+    failing = [name for name, _ in cases[:-1] if done.failed[name]]
+    if done.required:
+        lines += findings.compared_only(failing)
+    elif failing:
+        lines.append(f"these layouts fail a check: {', '.join(map(repr, failing))}")
     lines.append(findings.no_layout_pays(done.problem.site, comparable))
     lines += [*findings.failing(done.problem.site, chosen)]
     lines.append(findings.undecided(done.problem, chosen))

@@ -472,7 +472,10 @@ def tables(rows: Rows) -> Iterator[tuple[str, Table]]:
 
 
 FEW_PASSAGES = 20
-"""Number of passages of an event below which its 95 % quantile is not told."""
+"""Number of passages below which the 95 % quantile of an event is not printed."""
+
+FEW_RELEASES = 100
+"""Number of releases of an event below which more are advised."""
 
 
 def of_design_events(site: Site, rows: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -494,11 +497,14 @@ def of_design_events(site: Site, rows: Sequence[Mapping[str, Any]]) -> list[str]
             here = {row["quantity"]: row for row in own if row["x_m"] == rate["x_m"]}
             count, where = int(rate["n"]), f"design event {event!r} at {float(rate['x_m']):g} m"
             if count < FEW_PASSAGES:
-                passed = "1 block passes" if count == 1 else f"{count} blocks pass"
-                lines.append(
-                    f"{where}: only {passed} in {int(rate['releases']):,} releases; use "
-                    f"--event {shlex.quote(event)} to simulate this event alone"
+                releases = int(rate["releases"])
+                passed = {0: "no block passes", 1: "1 block passes"}.get(
+                    count, f"{count} blocks pass"
                 )
+                line = f"{where}: {passed} in {releases:,} releases"
+                if releases < FEW_RELEASES:
+                    line += f"; use --event {shlex.quote(event)} to simulate this event alone"
+                lines.append(line)
                 continue
             energy, height = (float(here[name]["q95"]) for name in ("energy", "height"))
             lines.append(

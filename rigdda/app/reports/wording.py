@@ -11,8 +11,8 @@ from rigdda import Barrier, Ditch, Mesh, Site
 from rigdda.barriers import Removal
 from rigdda.rounding import Rounding, rounded
 
-STEEP_CUT = 1.0
-"""Height by which the uphill side of a ditch exceeds its depth from which on it is told [m]."""
+HIGHER_SIDE = 1.0
+"""Height of the uphill side of a ditch above its depth from which on it is part of an order [m]."""
 
 
 def order(barrier: Barrier, site: Site) -> str:
@@ -32,7 +32,7 @@ def order(barrier: Barrier, site: Site) -> str:
     sizes, room = barrier.order(road.start)
     if isinstance(barrier, Ditch):
         cut, floor = barrier.cut(ground)
-        if cut > barrier.depth + STEEP_CUT:
+        if cut > barrier.depth + HIGHER_SIDE:
             sizes = f"with a cut of {cut:.1f} m on its uphill side and a floor {floor:.1f} m wide"
     return ", ".join(filter(None, (barrier.label, sizes, place))) + room
 

@@ -28,7 +28,7 @@ WITHOUT_GROUND = {
 
 
 RETIRED = {
-    name: "remove it: losses at the ground are described by `rolling`; give it, or name a ground"
+    name: "remove it: losses follow from rolling resistance; give `rolling`, or name a ground"
     for name in ("damping", "damping_sd")
 }
 """Former keys of surfaces and interfaces, and what to do about them."""

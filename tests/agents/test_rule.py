@@ -254,10 +254,19 @@ def test_three_seeds_give_one_answer() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["quick", "bench", "verge", "narrow"])
+@pytest.mark.parametrize("name", ["quick", "bench", "narrow"])
 def test_ten_seeds_give_one_answer(name: str) -> None:
     problem = DesignProblem(name)
     agree([answer(problem, seed) for seed in range(10)])
+
+
+@pytest.mark.slow
+def test_a_fence_that_not_every_seed_gives_is_a_close_call() -> None:
+    """On `verge`, the needed height of the fence is near that of its class."""
+    problem = DesignProblem("verge")
+    found = [answer(problem, seed) for seed in range(10)]
+    assert len({one.name for one in found}) > 1
+    assert all("close call" in one.caveat for one in found if one.name == "rule")
 
 
 def test_a_close_call_is_told() -> None:

@@ -74,7 +74,7 @@ SIZE_LIMITS = {"height": "max_height", "depth": "max_depth", "width": "max_width
 """Limits of the zone for sizes of barriers."""
 
 DOUBTED_BASE_FRICTION = 5.0
-"""Base friction of a wall above that of its own surface which is doubted [deg]."""
+"""Greatest plausible excess of the base friction of a wall over that of its own surface [deg]."""
 
 DOUBTED_PRICE_FACTOR = 20.0
 """Factor above or below a usual price beyond which its unit is doubted."""

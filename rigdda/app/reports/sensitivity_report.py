@@ -188,8 +188,8 @@ def _tornado(axes: Axes, output: Output, own: Sequence[tuple[Input, AnalysedInpu
     axes.axvline(0.0, color="black", linewidth=0.8)
     axes.set_yticks(range(len(own)), [_labelled(one) for one, _ in own], fontsize=9)
     axes.set_ylim(len(own) - 0.5, -0.5)
-    unit = "" if output.unit == "-" else f" {output.unit}"
-    title = f"{output.name}: average change, about a mean of {_number(mean)}{unit}"
+    unit = "" if output.unit == "-" else f" [{output.unit}]"
+    title = f"change of {output.name}{unit}; mean {_number(mean)}"
     axes.set_title(title, loc="left", fontsize=10)
     axes.grid(axis="x", alpha=0.25)
 

@@ -12,7 +12,7 @@ from rigdda.barriers import Removal
 from rigdda.rounding import Rounding, rounded
 
 HIGHER_SIDE = 1.0
-"""Height of the uphill side of a ditch above its depth from which on it is part of an order [m]."""
+"""An order gives the uphill side of a ditch if it exceeds the depth by more than this [m]."""
 
 
 def order(barrier: Barrier, site: Site) -> str:

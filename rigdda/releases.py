@@ -64,7 +64,7 @@ from rigdda.measurement import (
 from rigdda.model.interfaces import ContactProperties
 from rigdda.model.outcome import Outcome
 from rigdda.model.scene import Scene
-from rigdda.model.settings import Settings, longest_step_of_single
+from rigdda.model.settings import Settings, site_step
 from rigdda.model.site import Site
 from rigdda.model.site_tables import Drawn
 
@@ -149,8 +149,7 @@ class SingleReleases:
         site, properties = self._site, self._properties
         properties.draw(drawn)
         area = polygon_properties(block.vertices)[0]
-        most = longest_step_of_single(area, self._gravity)
-        dt = site.motion.dt / max(1, math.ceil(site.motion.dt / most))
+        dt = site_step(site.motion.dt, np.array([area]), self._gravity)
         arrays = self._blocks.get(dt)
         if arrays is None or not arrays.has_room(drawn.stems):
             if not clearly_convex(block.vertices):

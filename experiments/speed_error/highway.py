@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.bench.cases import FRAME, RUN_OUT
+from experiments.bench.cases import RUN_OUT
 from experiments.bench.engines import core as engine
 from experiments.speed_error.knobs import DEFAULT, STEP, Choice, choices
 from experiments.speed_error.store import Outcomes, kept
@@ -36,6 +36,9 @@ OUTCOMES = ("debris fraction [-]", "95 % run-out [m]", "energy at the barrier [k
 
 FINEST = {"dt": 1e-3, "tolerance": 1e-9, "sweep_tolerance": 2e-5, "open_close_iterations": 50}
 """Settings of the reference."""
+
+FRAME = 0.02
+"""Frame interval [s], a multiple of every step."""
 
 BLOCKS = "block area"
 

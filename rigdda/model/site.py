@@ -38,7 +38,7 @@ from rigdda.model import existing, forest, loose_blocks, site_names
 from rigdda.model.block import Block
 from rigdda.model.outcome import Outcome
 from rigdda.model.scene import Scene
-from rigdda.model.settings import Settings, longest_step
+from rigdda.model.settings import Settings, site_step
 from rigdda.model.site_generator import NARROW, WIDE, generate
 from rigdda.model.site_tables import Drawn, Event, SiteTables
 from rigdda.model.soundness import check_site
@@ -201,12 +201,12 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def settings(self, scene: Scene) -> Settings:
         """Return the numerical settings for the scene of a release.
 
-        The time step is that of the site, divided by the least whole number that makes it short
-        enough for the blocks.
+        The time step is that of the site, divided for small blocks
+        (`rigdda.model.settings.site_step`).
         """
         areas = [polygon_properties(b.vertices)[0] for b in scene.blocks if not b.fixed]
-        most = longest_step(np.array(areas), math.hypot(*scene.gravity_vector))
-        return Settings(dt=self.motion.dt / max(1, math.ceil(self.motion.dt / most)))
+        gravity = math.hypot(*scene.gravity_vector)
+        return Settings(dt=site_step(self.motion.dt, np.array(areas), gravity))
 
     def draw(self, seed: int = 0, event: str | None = None) -> Drawn:
         """Return the random properties of a release of an event.

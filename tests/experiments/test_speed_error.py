@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from experiments.bench.cases import FRAME, single
+from experiments.bench.cases import single
 from experiments.bench.penetration import centroids
 from experiments.front import front
 from experiments.made_by import MADE_BY
@@ -43,7 +43,7 @@ def test_outcome_of_blocks_that_pass_the_barrier_or_not():
     """Three of four blocks pass the toe at 10 m/s, two the road's edge: 1/2 m v^2 + 1/2 I w^2."""
     blocks = tuple(box(80.0 - 3.0 * i, 10.0) for i in range(4))
     scene = Scene(Terrain(FLAT), blocks, rock())
-    times = np.arange(60) * FRAME
+    times = np.arange(60) * highway.FRAME
     poses = np.zeros((60, 4, 3))
     poses[:, :, :2] = centroids(scene)
     poses[:, :, 0] += 10.0 * times[:, None]  # by 11.8 m: to 91.8, 88.8, 85.8 and 82.8 m

@@ -80,9 +80,9 @@ def test_a_block_that_slides_on_a_plank_that_turns_away_stays_on_it(dt):
 
 def test_a_step_is_refused_that_is_too_long_for_the_blocks():
     scene = Scene(Terrain(FLAT), (box(0.0, 0.5), box(5.0, 0.5)), rock())
-    most = 0.08 / math.sqrt(9.81)
+    most = 0.16 / math.sqrt(9.81)
     Simulation(scene, Settings(dt=0.999 * most))
-    with pytest.raises(BadInput, match=r"dt = .* give at most 0.02554 s: the blocks are 1 to 1 m"):
+    with pytest.raises(BadInput, match=r"dt = .* give at most 0.05108 s: the blocks are 1 to 1 m"):
         Simulation(scene, Settings(dt=1.001 * most))
     Simulation(scene, Settings(dt=0.1, mode="static"))
 

@@ -152,6 +152,17 @@ def test_a_fence_keeps_its_elongation_with_its_factor_from_the_road() -> None:
     assert found.check is not None and found.check.elongation_use == pytest.approx(2.6 / 2.3)
 
 
+def test_the_nearest_fence_keeps_clear_of_the_road() -> None:
+    """Whether a fence is clear of the road is certain, what the releases demand is not."""
+    close, fast = SITE.road.start - 0.2 - 2.57, math.sqrt(1.05 * 5e6 / ENERGY / 500.0 / SIZE)
+    found = envelope({20.0: fast / (TRAJECTORY * TOPOGRAPHY), close: 5.0})
+    asked = demands(found, SITE.rule)
+    assert [demand.x for demand in asked] == [20.0, close]
+    near = rule.nearest(DesignProblem(SITE, kinds=("fence",)), asked)
+    assert near.demand.x == 20.0 and max(near.uses.values()) == pytest.approx(1.05)
+    assert rule.nearest(DesignProblem(SITE), asked[1:]).elongation_use == pytest.approx(2.6 / 2.57)
+
+
 def test_where_nothing_comes_nothing_is_built() -> None:
     one = msgspec.structs.replace(event([5.0]), reaching=0)
     found = build(DesignEnvelope([20.0], 0.95, [one], [0.0]))

@@ -255,7 +255,9 @@ def _last_places(problem: DesignProblem, envelope: DesignEnvelope) -> Iterator[D
 def nearest(problem: DesignProblem, asked: list[Demand]) -> FenceCheck:
     """Return the check of the fence that comes nearest to the rule where none fits it.
 
-    Classes that are only made higher than the zone permits are left out.
+    Fences that keep clear of the road come first, because the elongation follows from the place
+    alone, while energy and height depend on the releases. Classes that are only made higher than
+    the zone permits are left out.
     """
     limit = problem.zone.max_height
     made = {name: row for name, row in FENCE_CLASSES.items() if row.lowest <= limit}
@@ -266,7 +268,14 @@ def nearest(problem: DesignProblem, asked: list[Demand]) -> FenceCheck:
         for demand in asked
         for name, row in (made or FENCE_CLASSES).items()
     ]
-    return min(checks, key=lambda check: (max(check.uses.values()), sum(check.uses.values())))
+    return min(
+        checks,
+        key=lambda check: (
+            check.elongation_use > 1.0,
+            max(check.uses.values()),
+            sum(check.uses.values()),
+        ),
+    )
 
 
 def why(problem: DesignProblem, asked: list[Demand]) -> str:

@@ -15,7 +15,7 @@ CASES: tuple[Case, ...] = (
     *supports.CASES,
 )
 
-STEPS = (1e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 2e-2, 1e-1)
+STEPS = (1e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)
 """Steps [s]; the longest is a multiple of all others and must be refused."""
 
 QUICK_STEPS = (5e-3, 2e-2, 1e-1)

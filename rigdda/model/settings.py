@@ -24,10 +24,10 @@ SHORTEST_DT = 1e-6
 
 LONGEST_STEP = 0.16
 """Maximum time step relative to sqrt(size / g), where size is the mean block size [-]; 51 ms for
-blocks of 1 m. A block falls by half its size in a time of sqrt(size / g). Of 47 difficult cases with
-steps of 50 ms, this limit refuses 17, and two of the others miss their tolerance: 1,000 blocks that
-fall into a hopper at 15 m/s penetrate by 0.64 of their size. With steps of 20 ms, two of 47 miss
-it. The releases of a site take shorter steps (`site_step`)."""
+blocks of 1 m. A block falls by half its size in a time of sqrt(size / g). With steps of 50 ms, this
+limit refuses 17 of 47 difficult cases, and two of the others miss their tolerance: 1,000 blocks
+that fall into a hopper at 15 m/s penetrate by 0.64 of their size. With steps of 20 ms, two of 47
+miss it. The releases of a site take shorter steps (`site_step`)."""
 
 SMALLEST = 0.5
 """Maximum time step relative to sqrt(size / g) of the smallest block [-], which falls by an eighth

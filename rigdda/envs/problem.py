@@ -593,7 +593,7 @@ class DesignProblem:
         return evaluation.gain(self._known.nothing)
 
     def _excess(self, evaluation: Evaluation) -> float:
-        """Return the greatest excess over a target [-]."""
+        """Return the greatest excess over a target [-]; events without releases do not count."""
         over = [
             seen[name].probability - greatest
             for greatest, seen in (
@@ -602,6 +602,7 @@ class DesignProblem:
             )
             if greatest is not None
             for name in self._design_events
+            if seen[name].releases
         ]
         if self.targets.individual is not None and evaluation.risk is not None:
             over.append(excess(evaluation.risk.individual.value, self.targets.individual))

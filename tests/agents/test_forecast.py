@@ -57,6 +57,26 @@ def test_features_are_finite_and_forecasts_are_shares(
     assert ((shares >= 0.0) & (shares <= 1.2)).all()
 
 
+def test_arrivals_follow_the_remaining_risk(
+    problem: DesignProblem, crossings: CrossingEnsemble
+) -> None:
+    """As many arrive as the stopped blocks leave, and fewer if less of the risk remains."""
+    forecast, menu = Forecast(problem, crossings), Menu(problem)
+    ones, none = np.ones(len(problem.site.events)), np.zeros(len(problem.site.events))
+    base = np.bincount(forecast._release, minlength=len(crossings.event))
+    assert (forecast.arrivals((), ones) == (base > 0)).all()
+    for barrier in menu.singles("ditch")[::25]:
+        share = forecast.analytic((barrier,))[0]
+        all_of_them = forecast.arrivals((barrier,), share)
+        left = base - np.bincount(
+            forecast._release[forecast.effect(barrier).stops], minlength=len(base)
+        )
+        assert (all_of_them == (left > 0)).all()
+        halved = forecast.arrivals((barrier,), 0.5 * share)
+        assert np.allclose(halved, np.where(left > 0, 1.0 - 0.5**left, 0.0))
+        assert (forecast.arrivals((barrier,), none) == 0.0).all()
+
+
 def test_the_surrogate_believes_what_it_has_seen(
     problem: DesignProblem, crossings: CrossingEnsemble
 ) -> None:

@@ -257,6 +257,17 @@ def test_missed_targets_are_rewarded_behind_all_that_is_not_ruinous(site: Site) 
     assert problem.reward(met) > -1.0 > problem.reward(poor) > problem.reward(worse)
 
 
+def test_a_design_event_without_releases_does_not_count_for_a_missed_target() -> None:
+    """Few releases may hold none of a design event, whose probability is then not a number."""
+    problem = DesignProblem("talus", targets={"reach": 1e-3})
+    found = problem.evaluate((Fence(77.25, 0.875, energy_class=100),), seeds=range(40, 44))
+    chances = [found.reach[event.name] for event in problem.site.events if event.design]
+    assert [math.isnan(chance.probability) for chance in chances].count(True) == 1
+    assert found.targets == "missed"
+    greatest = max(chance.probability for chance in chances if chance.releases)
+    assert problem.reward(found) == -1.0 - (greatest - 1e-3)
+
+
 @pytest.mark.parametrize(
     ("targets", "reached", "state"),
     [

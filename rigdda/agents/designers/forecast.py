@@ -212,23 +212,49 @@ class Forecast:
         )
         return stops, low, passes
 
-    def excess(self, layout: Layout) -> float:
-        """Return the largest forecast excess over a target [-], 0 if there is none."""
+    def arrivals(self, layout: Layout, remaining: Floats) -> Floats:
+        """Return the forecast probability that a block of each release reaches the road, (R,) [-].
+
+        Blocks that no barrier stops reach the road. If less of the risk remains than theirs, as
+        where a ditch also stops blocks that land beyond it, each of them reaches the road with the
+        ratio of the two.
+
+        Parameters
+        ----------
+        remaining : (E,) array
+            Forecast share of the risk of each event that remains with the layout, see `remaining`.
+        """
+        stopped = np.zeros(len(self._keys), dtype=bool)
+        for barrier in layout:
+            stopped |= self.effect(barrier).stops
+        share = np.maximum(self.analytic(layout)[0], 1e-12)
+        each = np.minimum(remaining / share, 1.0)[self.ensemble.event]
+        left = np.bincount(self._release[~stopped], minlength=len(self._whole))
+        none: Floats = (1.0 - each) ** left
+        return 1.0 - none
+
+    def excess(self, layout: Layout, remaining: Floats) -> float:
+        """Return the largest forecast excess over a target [-], 0 if there is none.
+
+        Parameters
+        ----------
+        remaining : (E,) array
+            Forecast share of the risk of each event that remains with the layout, see `remaining`.
+        """
         problem, targets = self.problem, self.problem.targets
         events = [i for i, e in enumerate(problem.site.events) if e.design]
         own, over = [self.effect(barrier) for barrier in layout], [0.0]
         if targets.reach is not None:
-            none = np.zeros(len(self._keys), dtype=bool)
-            left = self._release[~np.logical_or.reduce([none, *(e.stops for e in own)])]
-            reached = np.bincount(left, minlength=len(self._whole)) > 0
+            reached = self.arrivals(layout, remaining)
             over += [_mean(reached[self.ensemble.event == i]) - targets.reach for i in events]
         if targets.failure is not None:
             failed = sum((e.mended for e in own), np.zeros(len(self._whole))) > 0.0
             over += [_mean(failed[self.ensemble.event == i]) - targets.failure for i in events]
         risk = problem.nothing.risk
         if targets.individual is not None and risk is not None:
-            left_share = float(self.analytic(layout)[0].mean())
-            over.append(excess(left_share * risk.individual.value, targets.individual))
+            harm = np.array([problem.nothing.by_event[name] for name in problem.site.event_names])
+            share = float(remaining @ harm) / float(harm.sum()) if harm.any() else 1.0
+            over.append(excess(share * risk.individual.value, targets.individual))
         return max(over)
 
     def features(self, layout: Layout) -> Floats:
@@ -283,9 +309,9 @@ def _keys(table: NDArray[np.void]) -> NDArray[np.int64]:
     return keys
 
 
-def _mean(happened: Bools) -> float:
-    """Return the share of releases in which something happened, 0 without releases."""
-    return float(happened.mean()) if len(happened) else 0.0
+def _mean(chances: Bools | Floats) -> float:
+    """Return the mean over releases of a probability or of what happened, 0 without releases."""
+    return float(chances.mean()) if len(chances) else 0.0
 
 
 def _tall(barrier: Barrier) -> float:

@@ -138,7 +138,7 @@ class Surrogate:
         more = [[site.annual(x) if self.priced else 0.0 for x in new]]
         self.annual = np.concatenate([self.annual, *more])
         self.capital = np.concatenate([self.capital, [site.capital(x) for x in new]])
-        missed = [self._forecast.excess(x) for x in new]
+        missed = [self._forecast.excess(x, own) for x, own in zip(new, shares, strict=True)]
         self._missed_before = np.concatenate([self._missed_before, missed])
         most_barriers = max(map(len, self.layouts))
         index = np.full((len(self.layouts), most_barriers), -1, dtype=np.int64)

@@ -76,15 +76,15 @@ def judge(case: Case, scene: Scene, poses: Floats, velocities: Floats) -> Floats
 class Core:
     """The core of `rigdda`, with successive releases as in `rigdda.release_many`.
 
-    A site divides steps that are long for its blocks; such a step is therefore given directly.
+    Empty settings stand for those that the site derives for the blocks.
     """
 
     NAME = "rigdda"
 
     def __init__(self, case: Case, dt: float, settings: dict[str, Any]):
         self._case, self._dt, self._settings = case, dt, settings
-        self._site = replace(case.site, motion=replace(case.site.motion, dt=dt))
-        self._batch = Batch(self._site, ())
+        site = replace(case.site, motion=replace(case.site.motion, dt=dt))
+        self._batch = Batch(site, ())
 
     def release(self, seed: int) -> Release:
         """Compute a release until all its blocks sleep.
@@ -93,9 +93,8 @@ class Core:
         cutting of the rock into blocks, which is the same for all engines.
         """
         scene = self._batch.scene(self._case.draw(seed))
-        divided = self._site.settings(scene).dt < self._dt
         start = time.thread_time()
-        if self._settings or divided:
+        if self._settings:
             simulation = Simulation(scene, Settings(dt=self._dt, **self._settings))
         else:
             simulation = self._batch.simulation(scene)

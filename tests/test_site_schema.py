@@ -42,6 +42,13 @@ def refused(folder, name: str, old: str, new: str) -> BadInput:
     return caught.value
 
 
+def test_the_file_of_a_corridor_is_told_from_that_of_a_site(tmp_path):
+    file = tmp_path / "road.toml"
+    file.write_text('budget = 1e5\n[[sections]]\nsite = "verge"\nlength = 100.0\n')
+    with pytest.raises(BadInput, match="road.toml'?: this is the file of a corridor: use `rigdda"):
+        Site.load(file)
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [

@@ -120,6 +120,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             If a surface has neither a ground nor a coefficient of rolling resistance.
         """
         tables = fields.parse("site file", name, text)
+        if {"sections", "table", "budget"} & set(tables) and "slope" not in tables:
+            raise BadInput("site", name, "this is the file of a corridor: use `rigdda corridor`")
         found = fields.checked(cls, tables)
         found["surfaces"] = _with_rolling(found["surfaces"], tables["surfaces"])
         return cls(**found)

@@ -26,10 +26,10 @@ from rigdda import MECHANICS, BadInput, Layout, Outcome, __version__, check, dis
 from rigdda.agents.designers.constant import CONSTANTS, place
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.limits import JOB_RELEASES, SEED
-from rigdda.agents.network import features
 from rigdda.agents.run_record import check_terms
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem
+from rigdda.envs.forecast_table import joined
 from rigdda.envs.observation import observe
 from rigdda.files import atomic
 from rigdda.seeds import derive, release_seeds
@@ -82,7 +82,9 @@ PLACES = pa.schema(
         ("observation", pa.list_(pa.float32())),
     ]
 )
-"""Columns of the sites, one row per site."""
+"""Columns of the sites, one row per site.
+
+`observation` is that of the environments with `flat=True`: the arrays in alphabetical order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +219,7 @@ def part(recipe: Recipe, name: str) -> tuple[bytes, bytes]:
         "zone_start": problem.zone.start,
         "zone_end": problem.zone.end,
         "road_start": problem.site.road.start,
-        "observation": features(observe(problem)).tolist(),
+        "observation": joined(observe(problem)).tolist(),
     }
     return _packed(rows, OUTCOMES), _packed([place], PLACES)
 

@@ -113,8 +113,9 @@ class CorridorDesign(LayoutEnv):
         After the last section. Truncated by a TimeLimit only.
     Info
         As in `BarrierDesign`, for the section that was designed (at reset, for the first one
-        without barriers), and `section` (name), `length` [m], `money` [EUR] and `metres` [m] that
-        are left, and `spent` [EUR] and `gain` [EUR/year] so far.
+        without barriers), but without `targets`, because there are none; and `section` (name),
+        `length` [m], `money` [EUR] and `metres` [m] that are left, and `spent` [EUR] and `gain`
+        [EUR/year] so far.
     Randomness
         `reset` draws the sections and their order, their lengths, the budget, and the seeds of the
         releases.
@@ -137,7 +138,7 @@ class CorridorDesign(LayoutEnv):
         See `BarrierDesign`; `releases` is the number in each section.
     record : path, optional
         Folder for replays of each episode: one for each section with barriers, in a folder of the
-        episode.
+        episode. A truncated episode is written when the next one begins, or at `close`.
     record_trigger : callable, optional
         Whether to record an episode, given its number from 0.
 
@@ -174,7 +175,8 @@ class CorridorDesign(LayoutEnv):
         render_mode: str | None = None,
     ):
         self._corridor, self._names = _places(site)
-        self._sites = EpisodeSites("train", max_barriers, kinds, fidelity)
+        first = self._corridor.sections[0].site if self._corridor else self._names[0]
+        self._sites = EpisodeSites([first], max_barriers, kinds, fidelity)
         most = len(self._corridor.sections) if self._corridor else len(self._names)
         usual = most if self._corridor else min(DEFAULT_SECTIONS, most)
         self.sections = check.integer(
@@ -197,6 +199,7 @@ class CorridorDesign(LayoutEnv):
         self.budget = 0.0
         self.evaluations: list[Evaluation] = []
         self._gains: list[float] = []  # [EUR/year]
+        self._wanted: bool | None = None  # whether to record the episode; None: not yet known
         self._dropped: tuple[str, ...] = ()
 
     @property
@@ -233,6 +236,7 @@ class CorridorDesign(LayoutEnv):
 
     def draw(self, seed: int | None, options: Mapping[str, Any] | None = None) -> None:
         """Draw a new episode."""
+        self._cut_off()
         if options is not None and not isinstance(options, Mapping):
             raise BadInput("options", options, "give a mapping, such as {'budget': 200.0}")
         unknown = [name for name in options or () if name != "budget"]
@@ -279,7 +283,7 @@ class CorridorDesign(LayoutEnv):
 
     def start(self, _: Sample) -> tuple[Observation, Info]:
         """Start the drawn episode and return its first observation and info."""
-        self.open = True
+        self.open, self._wanted = True, None
         without = [s.length * s.problem.nothing.objective for s in self.placed]
         self._risk = np.array(without)
         self._scale = math.fsum(without) or 1.0
@@ -291,6 +295,8 @@ class CorridorDesign(LayoutEnv):
         if not self.open:
             raise ResetNeeded("the episode has ended: call reset() before the next step")
         numbers = encoding.vector("action", action, self.width)
+        if self.recorder and self._wanted is None:  # may raise: no state has changed yet
+            self._wanted = self.recorder.wants(self._episode)
         place = len(self.evaluations)
         built, dropped = self.slots.built(self.problem, numbers)
         layout, refused = self._affordable(built)
@@ -380,19 +386,29 @@ class CorridorDesign(LayoutEnv):
     def _end(self) -> None:
         """End the episode and write its replays if requested."""
         self.open = False
-        if self.recorder and self.recorder.wants(self._episode):
+        if self.recorder and self._wanted:
             try:
-                self._record(self.recorder.folder / f"episode-{self._episode:06d}")
+                self._record(self.recorder.new_folder(self._episode))
             except OSError as error:
                 gymnasium.logger.warn(f"no replay of episode {self._episode}: {error}")
         self._episode += 1
 
+    def _cut_off(self) -> None:
+        """End an episode that was truncated after at least one section."""
+        if self.open and self.evaluations:
+            self._end()
+
+    def close(self) -> None:
+        """End the current episode and close the environment."""
+        self._cut_off()
+        super().close()
+
     def _record(self, folder: Path) -> None:
-        """Write a replay of the representative release of each section with barriers."""
+        """Write a replay of the representative release of each designed section with barriers."""
         from rigdda.replay.recording import Marks
 
-        folder.mkdir(parents=True, exist_ok=True)
-        for i, (section, now) in enumerate(zip(self.placed, self.evaluations, strict=True)):
+        for i, now in enumerate(self.evaluations):
+            section = self.placed[i]
             if not now.layout:
                 continue
             site, (seed, event) = section.problem.site, now.typical

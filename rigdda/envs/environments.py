@@ -467,7 +467,8 @@ class BarrierDesign(BarrierEnv):
     max_barriers, kinds, targets, max_cost, fidelity, checks
         See `DesignProblem`. A barrier that would exceed `max_cost` is not built, and neither is one
         that fails a required check wherever it may stand. If every episode draws its site, the
-        default is all kinds; mesh is not available on sites without mesh options.
+        default is all kinds but `removal` and `wall`; mesh is not available on sites without mesh
+        options.
     releases : int
         Number of random releases over which an episode averages.
     flat : bool

@@ -67,6 +67,7 @@ class Catalogue:
         self.rows = self.table.rows(site)
         self.flat = check.boolean("flat", flat)
         self.reward, self.mask = self.table.reward, self.table.mask
+        self.layouts = np.array(self.table.layouts, dtype=object)
         self.actions = spaces.Discrete(len(self.table.layouts))
         ends = np.cumsum([FIELDS[name].size for name in NAMES])
         arrays = dict(zip(NAMES, np.split(self.table.observation, ends[:-1], axis=1), strict=True))
@@ -88,6 +89,10 @@ class Catalogue:
         if self.flat:
             return self.arrays[""][rows].copy()
         return {name: array[rows].copy() for name, array in self.arrays.items()}
+
+    def built(self, rows: Any, actions: Any) -> Any:
+        """Return the layout that each action builds as JSON: none if it cannot be built."""
+        return self.layouts[np.where(self.mask[rows, actions], actions, 0)]
 
     def chosen_rows(self, options: Options) -> NDArray[np.int64] | None:
         """Return the rows of the option `site`, or None without options.
@@ -138,7 +143,7 @@ class BarrierForecast(gymnasium.Env[Any, Any]):
         After one step. Truncated by a TimeLimit only.
     Info
         `site` (name), `action_mask` ((A,) int8, 1 for layouts that can be built) and, after a step,
-        `layout` (the relative layout as JSON).
+        `layout` (the relative layout that was built, as JSON).
     Randomness
         `reset` draws the site; `reset(seed=...)` makes all later draws reproducible.
 
@@ -161,6 +166,8 @@ class BarrierForecast(gymnasium.Env[Any, Any]):
     ------
     BadInput
         If a keyword or, in `step`, the action is invalid.
+    TypeError
+        If a render mode is given. Stable-Baselines3 then makes the environment without one.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
@@ -171,11 +178,10 @@ class BarrierForecast(gymnasium.Env[Any, Any]):
         table: Table = None,
         flat: bool = False,
         layout_features: bool = False,
-        render_mode: str | None = None,
+        render_mode: None = None,
     ):
         if render_mode is not None:
-            raise BadInput("render_mode", render_mode, "leave it out: there are no pictures")
-        self.render_mode = None
+            raise TypeError(f"render_mode = {render_mode!r}: leave it out: there are no pictures")
         self.catalogue = Catalogue(site, table, flat, layout_features)
         self.action_space = self.catalogue.actions
         self.observation_space = self.catalogue.observations
@@ -204,7 +210,7 @@ class BarrierForecast(gymnasium.Env[Any, Any]):
             raise BadInput("action", action, hint)
         self._open = False
         reward = float(self.catalogue.reward[self._row, action])
-        told = self._info() | {"layout": self.catalogue.table.layouts[int(action)]}
+        told = self._info() | {"layout": self.catalogue.built(self._row, action)}
         return self.catalogue.observe(self._row), reward, True, False, told
 
     def action_masks(self) -> NDArray[np.bool_]:
@@ -212,6 +218,10 @@ class BarrierForecast(gymnasium.Env[Any, Any]):
         if self._row is None:
             raise ResetNeeded("call reset() before action_masks()")
         return self.catalogue.mask[self._row].copy()
+
+    def render(self) -> None:
+        """Warn that there are no pictures."""
+        gymnasium.logger.warn("render() returns None: this environment has no pictures")
 
     def _info(self) -> dict[str, Any]:
         assert self._row is not None
@@ -229,7 +239,8 @@ class BarrierForecastVector(VectorEnv[Any, NDArray[np.int64], Any]):
     num_envs : int
         Number of copies.
     max_episode_steps : int, optional
-        Accepted as from every environment; an episode has one step.
+        Number of steps after which an episode is truncated, as by a TimeLimit. An episode has one
+        step, so that only 1 has an effect.
     autoreset_mode : AutoresetMode or its value
         What happens after the end of an episode, see `rigdda.envs.vector.BarrierVector`.
     site, table, flat, layout_features, render_mode
@@ -239,6 +250,13 @@ class BarrierForecastVector(VectorEnv[Any, NDArray[np.int64], Any]):
     ------
     BadInput
         If a keyword or, in `step`, an action is invalid; the environment is then unchanged.
+    TypeError
+        If a render mode is given.
+
+    Attributes
+    ----------
+    shared : BarrierForecast
+        A single environment, which holds what all copies have in common.
     """
 
     metadata: dict[str, Any] = BarrierForecast.metadata | {
@@ -255,9 +273,10 @@ class BarrierForecastVector(VectorEnv[Any, NDArray[np.int64], Any]):
         self.num_envs = check.integer("num_envs", num_envs, 1, MOST_COPIES)
         if max_episode_steps is not None:
             check.integer("max_episode_steps", max_episode_steps, 1)
+        self.limit = max_episode_steps
         self.mode = reset_mode(autoreset_mode)
         self.metadata = type(self).metadata | {"autoreset_mode": self.mode}
-        one = BarrierForecast(**keywords)
+        self.shared = one = BarrierForecast(**keywords)
         self.catalogue, self.render_mode = one.catalogue, None
         self.single_action_space = one.action_space
         self.single_observation_space = one.observation_space
@@ -277,36 +296,51 @@ class BarrierForecastVector(VectorEnv[Any, NDArray[np.int64], Any]):
     ) -> tuple[Any, dict[str, Any]]:
         """Start an episode in every copy, or in those selected by the option `reset_mask`."""
         mask, own = reset_mask(options, self.num_envs)
-        rows = self.catalogue.chosen_rows(own)
+        return self.start(seed, [own] * self.num_envs, mask)
+
+    def start(
+        self,
+        seed: int | Sequence[int | None] | None,
+        options: Sequence[Options],
+        mask: NDArray[np.bool_] | None = None,
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode in every copy, or in those of a mask, each with its own options."""
+        chosen = range(self.num_envs) if mask is None else np.flatnonzero(mask).tolist()
+        rows = {i: self.catalogue.chosen_rows(options[i]) for i in chosen}
         seeds = copy_seeds(seed, self.num_envs)
-        chosen = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
-        if len(chosen) < self.num_envs and (self._row < 0).any():
+        if len(rows) < self.num_envs and (self._row < 0).any():
             raise ResetNeeded("call reset() for all copies before resetting some of them")
-        for i in chosen.tolist():
+        for i, own in rows.items():
             if seeds[i] is not None:
                 self._random[i], _ = gymnasium.utils.seeding.np_random(seeds[i])
                 self._episodes[i].restart()
-            episodes = self._episodes[i] if rows is None else Episodes(rows)
+            episodes = self._episodes[i] if own is None else Episodes(own)
             self._row[i] = episodes.draw(self._random[i])
-        self._ended[chosen] = False
+            self._ended[i] = False
         return self.catalogue.observe(self._row), self._infos(self._row)
 
     def step(self, actions: NDArray[np.int64]) -> Batch:
         """Take a step in every copy; `actions` has shape (num_envs,)."""
         given = self._checked(actions)
         resting = self._ended.copy()
-        rewards = np.where(resting, 0.0, self.catalogue.reward[self._row, given])
         terminated = ~resting
-        infos: dict[str, Any] = {}
+        rewards = np.where(resting, 0.0, self.catalogue.reward[self._row, given])
+        built = np.where(resting, None, self.catalogue.built(self._row, given))
+        told = {"layout": built, "_layout": terminated} if terminated.any() else {}
         if self.mode is AutoresetMode.SAME_STEP:
-            infos = self._final(given)
+            infos = self._final(told)
             self._draw(np.arange(self.num_envs))
         else:
+            infos = told
             self._draw(np.flatnonzero(resting))
             self._ended = terminated.copy()
         infos |= self._infos(self._row)
-        seen = self.catalogue.observe(self._row)
-        return seen, rewards, terminated, np.zeros(self.num_envs, dtype=np.bool_), infos
+        truncated = terminated & (self.limit == 1)
+        return self.catalogue.observe(self._row), rewards, terminated, truncated, infos
+
+    def render(self) -> None:
+        """Warn that there are no pictures."""
+        self.shared.render()
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return which layouts can be built on the site of each copy, (num_envs, A)."""
@@ -319,7 +353,7 @@ class BarrierForecastVector(VectorEnv[Any, NDArray[np.int64], Any]):
             self._row[i] = self._episodes[i].draw(self._random[i])
 
     def _checked(self, actions: Any) -> NDArray[np.int64]:
-        """Return the validated actions."""
+        """Return the validated actions; 0 for copies whose next episode begins in this step."""
         if (self._row < 0).any():
             raise ResetNeeded("call reset() before the first step")
         if self.mode is AutoresetMode.DISABLED and self._ended.any():
@@ -332,9 +366,12 @@ class BarrierForecastVector(VectorEnv[Any, NDArray[np.int64], Any]):
         except ValueError:  # lists of different lengths
             raise BadInput("actions", actions, hint) from None
         whole = given.shape == (self.num_envs,) and np.issubdtype(given.dtype, np.integer)
-        if not whole or given.min() < 0 or given.max() > most:
+        if not whole:
             raise BadInput("actions", actions, hint)
-        return given.astype(np.int64)
+        used = np.where(self._ended, 0, given)
+        if used.min() < 0 or used.max() > most:
+            raise BadInput("actions", actions, hint)
+        return used.astype(np.int64)
 
     def _infos(self, rows: NDArray[np.int64]) -> dict[str, Any]:
         """Return the infos of all copies; a name with an underscore marks where there is one."""
@@ -344,8 +381,11 @@ class BarrierForecastVector(VectorEnv[Any, NDArray[np.int64], Any]):
         return {key: value for name, own in named.items() for key, value in
                 ((name, own), (f"_{name}", every))}  # fmt: skip
 
-    def _final(self, actions: NDArray[np.int64]) -> dict[str, Any]:
-        """Return the last observations and infos of the episodes that end in this step."""
+    def _final(self, told: dict[str, Any]) -> dict[str, Any]:
+        """Return the last observations and infos of the episodes that end in this step.
+
+        `told` is what the infos contain in addition to those of `reset`.
+        """
         seen, every = self.catalogue.observe(self._row), np.ones(self.num_envs, dtype=np.bool_)
         last = np.empty(self.num_envs, dtype=object)
         if self.catalogue.flat:
@@ -354,6 +394,5 @@ class BarrierForecastVector(VectorEnv[Any, NDArray[np.int64], Any]):
             last[:] = [
                 dict(zip(seen, own, strict=True)) for own in zip(*seen.values(), strict=True)
             ]
-        layouts = np.array(self.catalogue.table.layouts, dtype=object)[actions]
-        final = self._infos(self._row) | {"layout": layouts, "_layout": every}
+        final = self._infos(self._row) | told
         return {"final_obs": last, "_final_obs": every, "final_info": final, "_final_info": every}

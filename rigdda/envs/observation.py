@@ -1,6 +1,7 @@
 """Observations of a site and of the layout on it.
 
-They are 1-D float32 arrays, scaled to about unit spread. No entry is the same for all sites.
+They are 1-D float32 arrays, shifted and scaled so that most entries have a spread of about one or
+less over the generated sites. No entry is the same for all sites.
 """
 
 from __future__ import annotations
@@ -55,8 +56,8 @@ FIELDS: dict[str, Field] = {
         "tan of the friction angle and restitution at the start and at the end of the zone",
     ),
     "road": Field(1, 0.92, 0.06, "log10 of the width of the road [m]"),
-    "closure": Field(1, 4.75, 0.12, "log10 of the cost of one day of road closure [EUR]"),
-    "nothing": Field(1, 2.7, 0.25, "log10 of Z without barriers [EUR per metre and year]"),
+    "closure": Field(1, 4.75, 0.12, "log10(1 + cost of one day of road closure in EUR)"),
+    "nothing": Field(1, 2.7, 0.25, "log10(0.001 + Z without barriers in EUR per m and year)"),
     "groups": Field(1, 0.3, 0.2, "share of Z without barriers due to groups of blocks"),
     "rates": Field(
         2, -0.2, 0.7, "log10 of the rate of releases of single blocks and of groups "

@@ -5,9 +5,10 @@ The replay writer is imported on first use.
 
 from __future__ import annotations
 
+import itertools
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -41,9 +42,9 @@ class Recorder:
     Parameters
     ----------
     folder : path
-        Folder for the files `episode-NNNNNN.rrd`; created when needed. No file is overwritten: if
-        another copy of the environment or an earlier run has written the same number, the name is
-        `episode-NNNNNN-2.rrd`, and so on.
+        Folder for the files `episode-NNNNNN.rrd`, or for a folder `episode-NNNNNN` of each episode;
+        created when needed. No file is overwritten: if another copy of the environment or an
+        earlier run has written the same number, the name is `episode-NNNNNN-2.rrd`, and so on.
     trigger : callable, optional
         Whether to record an episode, given its number from 0; by default all are recorded.
 
@@ -147,13 +148,35 @@ class Recorder:
         write_episode(path, placements, road, shown.words, _title(site, episode), record)
         return path
 
+    def new_folder(self, episode: int) -> Path:
+        """Create the folder of an episode with several files, and return its path.
+
+        Raises
+        ------
+        OSError
+            If it cannot be created.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        names = _names(episode)
+        while True:
+            folder = self.folder / next(names)
+            try:
+                folder.mkdir()
+            except FileExistsError:
+                continue
+            return folder
+
     def _path(self, episode: int) -> Path:
         """Return the path of a new file; copies of an environment may share the folder."""
-        path, number = self.folder / f"episode-{episode:06d}.rrd", 2
-        while path.exists():
-            path = path.with_name(f"episode-{episode:06d}-{number}.rrd")
-            number += 1
-        return path
+        paths = (self.folder / f"{name}.rrd" for name in _names(episode))
+        return next(path for path in paths if not path.exists())
+
+
+def _names(episode: int) -> Iterator[str]:
+    """Yield the names that an episode may have, in order of preference."""
+    name = f"episode-{episode:06d}"
+    yield name
+    yield from (f"{name}-{number}" for number in itertools.count(2))
 
 
 def _check_room(folder: Path) -> None:

@@ -135,10 +135,11 @@ class ForecastBridge(VecEnv):
         self._actions: NDArray[np.int64] = np.zeros(batch.num_envs, dtype=np.int64)
 
     def reset(self) -> Any:
-        """Start an episode in every copy, with the pending seeds."""
-        seen, _ = self.batch.reset(seed=self._seeds)
+        """Start an episode in every copy, with the pending seeds and options."""
+        seen, infos = self.batch.start(self._seeds, self._options)
         self._reset_seeds()
         self._reset_options()
+        self.reset_infos = _of_each(infos, self.num_envs)
         return seen
 
     def step_async(self, actions: NDArray[np.int64]) -> None:
@@ -148,10 +149,10 @@ class ForecastBridge(VecEnv):
     def step_wait(self) -> tuple[Any, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Step every copy; all of them restart, with the last observation in the info."""
         seen, rewards, dones, _, infos = self.batch.step(self._actions)
-        told = [
-            {"terminal_observation": last, "TimeLimit.truncated": False}
-            for last in infos["final_obs"]
-        ]
+        told = _of_each(infos.pop("final_info"), self.num_envs)
+        for info, last in zip(told, infos.pop("final_obs"), strict=True):
+            info |= {"terminal_observation": last, "TimeLimit.truncated": False}
+        self.reset_infos = _of_each(infos, self.num_envs)
         return seen, rewards.astype(np.float32), dones, told
 
     def close(self) -> None:
@@ -159,8 +160,8 @@ class ForecastBridge(VecEnv):
         self.batch.close()
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
-        """Return an attribute of the batch for each selected copy."""
-        return [getattr(self.batch, attr_name) for _ in self._get_indices(indices)]
+        """Return an attribute that all copies share for each selected copy."""
+        return [getattr(self.batch.shared, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(
         self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None
@@ -186,6 +187,12 @@ class ForecastBridge(VecEnv):
     ) -> list[bool]:
         """Return False for each selected copy: copies are never wrapped."""
         return [False for _ in self._get_indices(indices)]
+
+
+def _of_each(infos: dict[str, Any], copies: int) -> list[dict[str, Any]]:
+    """Return the info of each copy, given the infos of a batch that all copies have."""
+    names = [name for name in infos if f"_{name}" in infos]
+    return [{name: infos[name][i] for name in names} for i in range(copies)]
 
 
 def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:

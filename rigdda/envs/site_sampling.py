@@ -49,7 +49,7 @@ REMOVAL = "removal"
 """The kind that only sites with removable barriers offer."""
 
 SAMPLED_KINDS = (*USUAL, MESH)
-"""Default kinds of barrier if every episode draws its site."""
+"""Default kinds of barrier if every episode draws its site: all but removal and the rigid wall."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,8 @@ class EpisodeSites:
     site : Places
         A site, a split, or a sequence of sites.
     max_barriers, kinds, fidelity, targets, max_cost, checks
-        As for `DesignProblem`; if every episode draws its site, the default is all kinds.
+        As for `DesignProblem`; if every episode draws its site, the default of `kinds` is
+        `SAMPLED_KINDS`.
 
     Attributes
     ----------

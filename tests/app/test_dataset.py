@@ -6,15 +6,17 @@ import json
 import shutil
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 
-from rigdda import BadInput
-from rigdda.agents.network import WIDTH
+from rigdda import BadInput, Site
 from rigdda.app import cli, dataset
 from rigdda.app.dataset import Recipe
 from rigdda.barriers import from_table
 from rigdda.envs import DesignProblem
+from rigdda.envs.forecast_table import NAMES, WIDTH
+from rigdda.envs.observation import FIELDS
 
 SAMPLE = Path(__file__).parents[2] / "experiments" / "results" / "dataset_sample"
 
@@ -43,7 +45,8 @@ def test_rows_are_the_outcomes_of_the_releases(folder: Path) -> None:
     assert rows[0]["capital"] == again.cost and rows[0]["annual"] == again.capital
     (place,) = places.to_pylist()
     assert place["site"] == SITE and place["nothing"] == problem.nothing.objective
-    assert len(place["observation"]) == WIDTH
+    flat, _ = gymnasium.make("rigdda/BarrierDesign-v0", site=SITE, flat=True).reset()
+    assert place["observation"] == flat.tolist()
 
 
 def test_layouts_differ_and_may_be_built() -> None:
@@ -131,6 +134,16 @@ def test_a_model_of_the_sample_predicts_sites_that_it_has_not_seen() -> None:
         wrong += float(np.square(x[out] @ weights - y[out]).sum())
         usual += float(np.square(y[~out].mean() - y[out]).sum())
     assert wrong < 0.85 * usual
+
+
+def test_the_observations_of_the_sample_are_in_the_order_of_flat_observations() -> None:
+    _, places = dataset.read(SAMPLE)
+    start = sum(FIELDS[name].size for name in NAMES[: NAMES.index("closure")])
+    for place in places.to_pylist():
+        assert len(place["observation"]) == WIDTH
+        cost = Site.load(place["site"]).consequences.closure
+        closure = (np.log10(1.0 + cost) - FIELDS["closure"].centre) / FIELDS["closure"].spread
+        assert place["observation"][start] == pytest.approx(closure, abs=1e-4)
 
 
 def test_costs_are_those_of_an_evaluation(folder: Path) -> None:

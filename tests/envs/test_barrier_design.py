@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium
+import msgspec
 import numpy as np
 import pytest
 from cases import FREE, HARMLESS, cut
@@ -16,7 +17,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import data_equivalence
 
 import rigdda
-from rigdda import BadInput, Fence, sites
+from rigdda import BadInput, Fence, Prices, sites
 from rigdda.envs import DesignProblem, Targets
 from rigdda.envs.environments import BarrierDesign, BarrierEnv, BarrierPlacement
 
@@ -85,6 +86,42 @@ def test_without_prices_the_reward_is_the_debris_kept_off() -> None:
     env.reset(seed=0)
     _, reward, *_, info = env.step(ACTION)
     assert reward == pytest.approx(1.0 - info["debris_share"])
+
+
+@pytest.mark.parametrize("prices", [FREE, None])
+def test_the_reward_is_the_share_of_debris_only_if_z_is_zero(prices: Prices | None) -> None:
+    harmless = BarrierDesign(cut(prices, HARMLESS), **TERMS)
+    harmless.reset(seed=0)
+    _, reward, *_, info = harmless.step(ACTION)
+    assert reward == (pytest.approx(1.0 - info["debris_share"]) if prices else -1.0)
+    harmful = BarrierDesign(cut(prices), **TERMS)
+    harmful.reset(seed=0)
+    _, reward, *_, info = harmful.step(ACTION)
+    nothing = harmful.problem.nothing.objective
+    assert reward == pytest.approx((nothing - info["objective"]) / nothing)
+
+
+@pytest.mark.parametrize("env_class", [BarrierDesign, BarrierPlacement])
+def test_scores_are_in_the_order_of_the_kinds_of_the_slots(env_class: type[BarrierEnv]) -> None:
+    """It is the same on a site that lacks some of the kinds."""
+    bare = msgspec.structs.replace(CUT, meshes=())
+    env = env_class([bare, CUT], max_barriers=1, kinds=("mesh", "fence", "ditch"), releases=1)
+    assert env.slots.kinds == ("mesh", "fence", "ditch")
+    for site, offered in ((bare, ("fence", "ditch")), (CUT, ("mesh", "fence", "ditch"))):
+        for i, kind in enumerate(env.slots.kinds):
+            env.reset(seed=0, options={"site": site})
+            assert env.problem.kinds == offered
+            scores = np.eye(3)[i]
+            *_, info = env.step(np.array([1.0, 0.9, -0.5, -0.6, *scores], np.float32))
+            built = {barrier.kind for barrier in info["layout"]}
+            assert built == ({kind} if kind in offered else {"fence"})
+
+
+def test_removal_is_a_default_kind_of_a_single_site_only() -> None:
+    assert "removal" in BarrierDesign("old-fence").slots.kinds
+    for site in (["old-fence"], "wide-train"):
+        assert {"removal", "wall"}.isdisjoint(BarrierDesign(site).slots.kinds)
+        assert "mesh" in BarrierDesign(site).slots.kinds
 
 
 @pytest.mark.slow

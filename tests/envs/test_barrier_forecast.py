@@ -63,7 +63,8 @@ def test_the_reward_is_the_forecast_reduction_of_z(table: ForecastTable) -> None
             _, reward, terminated, truncated, info = env.step(action)
             built = np.isfinite(table.z[row, action])
             assert reward == (pytest.approx(1.0 - table.z[row, action]) if built else 0.0)
-            assert terminated and not truncated and info["layout"] == table.layouts[action]
+            assert terminated and not truncated
+            assert info["layout"] == (table.layouts[action] if built else "[]")
             assert bool(info["action_mask"][action]) == built
 
 
@@ -156,13 +157,14 @@ def test_a_copy_is_what_it_is_alone(
         seen, rewards, terminated, truncated, infos = batch.step(actions)
         assert not truncated.any()
         if mode == "NextStep" and turn % 2:
-            assert not terminated.any() and not rewards.any()
+            assert not terminated.any() and not rewards.any() and "layout" not in infos
             started = [env.reset() for env in alone]
             continue
         assert terminated.all()
         ended = [env.step(action) for env, action in zip(alone, actions, strict=True)]
         assert rewards.tolist() == [reward for _, reward, *_ in ended]
         if mode == "NextStep":
+            assert infos["layout"].tolist() == [info["layout"] for *_, info in ended]
             started = [(own, info) for own, *_, info in ended]
             continue
         for i, (own, *_, info) in enumerate(ended):
@@ -229,7 +231,6 @@ def test_it_can_be_pickled_in_an_episode(table: ForecastTable) -> None:
         ({"site": ()}, "site = "),
         ({"flat": 1}, "flat"),
         ({"table": "none.safetensors"}, "none.safetensors"),
-        ({"render_mode": "rgb_array"}, "no pictures"),
     ],
 )
 def test_a_bad_keyword_is_named(table: ForecastTable, terms: dict, words: str) -> None:
@@ -238,6 +239,113 @@ def test_a_bad_keyword_is_named(table: ForecastTable, terms: dict, words: str) -
     for kind in (BarrierForecast, BarrierForecastVector):
         with pytest.raises(BadInput, match=words):
             kind(**{"table": table} | terms)
+
+
+def test_there_are_no_pictures(table: ForecastTable) -> None:
+    env = gymnasium.make(NAME, table=table, render_mode=None)
+    batch = gymnasium.make_vec(NAME, 2, vectorization_mode="vector_entry_point", table=table)
+    for made in (env, batch):
+        made.reset(seed=0)
+        with pytest.warns(UserWarning, match="no pictures"):
+            assert made.render() is None
+    with (
+        pytest.warns(UserWarning, match="not in the possible render_modes"),
+        pytest.raises(TypeError, match="no pictures"),
+    ):
+        gymnasium.make(NAME, table=table, render_mode="rgb_array")
+
+
+@pytest.mark.filterwarnings("ignore:.*render_mode='rgb_array'")
+def test_stable_baselines3_makes_it_by_its_name() -> None:
+    dqn = pytest.importorskip("stable_baselines3").DQN
+    from stable_baselines3.common.env_util import make_vec_env
+
+    copies = make_vec_env(NAME, 2)
+    assert copies.reset()["nothing"].shape == (2, 1)
+    model = dqn("MultiInputPolicy", NAME, learning_starts=8, buffer_size=64, batch_size=8)
+    model.learn(24)
+    assert model.num_timesteps == 24
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep", "Disabled"])
+def test_a_limit_truncates_a_batch_as_a_single_environment(table: ForecastTable, mode: str) -> None:
+    terms = {"vectorization_mode": "vector_entry_point", "autoreset_mode": mode, "table": table}
+    for limit in (1, 2):
+        alone = gymnasium.make(NAME, table=table, max_episode_steps=limit)
+        alone.reset(seed=0)
+        ends = alone.step(1)[2:4]
+        batch = gymnasium.make_vec(NAME, 2, max_episode_steps=limit, **terms)
+        batch.reset(seed=0)
+        _, _, terminated, truncated, _ = batch.step(np.array([1, 1]))
+        assert [*zip(terminated.tolist(), truncated.tolist(), strict=True)] == [ends, ends]
+        assert ends == (True, limit == 1)
+        if mode == "NextStep":
+            *_, terminated, truncated, _ = batch.step(np.array([1, 1]))
+            assert not terminated.any() and not truncated.any()
+
+
+def test_a_copy_that_begins_anew_ignores_its_action(table: ForecastTable) -> None:
+    batch = gymnasium.make_vec(
+        NAME, 2, vectorization_mode="vector_entry_point", autoreset_mode="NextStep", table=table
+    )
+    batch.reset(seed=0)
+    batch.step(np.array([1, 2]))
+    _, rewards, terminated, *_ = batch.step(np.array([99, -1]))
+    assert not rewards.any() and not terminated.any()
+    with pytest.raises(BadInput, match="from 0 to 3"):
+        batch.step(np.array([99, 0]))
+    batch.step(np.array([0, 0]))  # the refused step has changed nothing
+    batch.step(np.array([0, 0]))
+
+
+def test_the_layout_is_told_after_a_step_without_autoreset(table: ForecastTable) -> None:
+    batch = gymnasium.make_vec(
+        NAME, 2, vectorization_mode="vector_entry_point", table=table, site="random-1",
+        autoreset_mode="Disabled",
+    )  # fmt: skip
+    _, infos = batch.reset(seed=0)
+    assert "layout" not in infos
+    *_, infos = batch.step(np.array([1, 2]))  # 2 cannot be built
+    assert infos["layout"].tolist() == [table.layouts[1], "[]"] and infos["_layout"].all()
+
+
+def test_the_bridge_says_what_single_environments_say(table: ForecastTable) -> None:
+    pytest.importorskip("stable_baselines3")
+    copies = rigdda.envs.sb3_vec_env(NAME, 3, table=table)
+    assert copies.get_attr("action_space") == 3 * [gymnasium.spaces.Discrete(4)]
+    assert copies.get_attr("observation_space", [1]) == [copies.observation_space]
+    copies.seed(5)
+    places = ["random-1", "test", None]
+    copies.set_options([{"site": place} if place else {} for place in places])
+    seen = copies.reset()
+    alone = [gymnasium.make(NAME, table=table) for _ in places]
+    told = [
+        env.reset(seed=5 + i, options={"site": place} if place else None)
+        for i, (env, place) in enumerate(zip(alone, places, strict=True))
+    ]
+
+    def same(info: dict, wanted: dict) -> None:
+        assert {*info} - {"terminal_observation", "TimeLimit.truncated", "episode"} == {*wanted}
+        assert info["site"] == wanted["site"] and info.get("layout") == wanted.get("layout")
+        assert (info["action_mask"] == wanted["action_mask"]).all()
+
+    actions = np.array([2, 1, 3])  # the first cannot be built
+    for i, (own, wanted) in enumerate(told):
+        same(copies.unwrapped.reset_infos[i], wanted)
+        assert all((seen[name][i] == own[name]).all() for name in own)
+    _, rewards, dones, infos = copies.step(actions)
+    for i, env in enumerate(alone):
+        last, reward, *_, wanted = env.step(actions[i])
+        assert dones[i] and rewards[i] == np.float32(reward)
+        same(infos[i], wanted)
+        assert all((infos[i]["terminal_observation"][name] == last[name]).all() for name in last)
+        same(copies.unwrapped.reset_infos[i], env.reset()[1])
+    copies.set_options({"site": "random-2"})
+    copies.reset()
+    assert [info["site"] for info in copies.unwrapped.reset_infos] == 3 * ["random-2"]
+    copies.set_options({"place": "random-2"})
+    with pytest.raises(BadInput, match="options"):
+        copies.reset()
 
 
 def test_a_bad_action_or_option_is_named(table: ForecastTable) -> None:

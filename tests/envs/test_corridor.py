@@ -120,6 +120,99 @@ def test_replays_show_the_sections_with_barriers(tmp_path: Path) -> None:
     assert rigdda.envs.repetition.repeat(found).same
 
 
+def test_replays_of_another_run_are_kept(tmp_path: Path) -> None:
+    content = {}
+    for seed, name in ((1, "episode-000000"), (2, "episode-000000-2"), (3, "episode-000000-3")):
+        env = make(record=tmp_path, budget=2000.0)
+        _, infos = played(env, seed, MIDDLE)
+        built = sum(bool(info["layout"]) for info in infos)
+        files = [*(tmp_path / name).iterdir()]
+        assert len(files) == built > 0
+        assert all(file.read_bytes() == old for file, old in content.items())
+        content |= {file: file.read_bytes() for file in files}
+    assert sorted(folder.name for folder in tmp_path.iterdir()) == [
+        "episode-000000", "episode-000000-2", "episode-000000-3"
+    ]  # fmt: skip
+
+
+def test_copies_that_share_a_folder_keep_each_others_replays(tmp_path: Path) -> None:
+    batch = gymnasium.make_vec(
+        "rigdda/Corridor-v0", 2, vectorization_mode="sync", site=list(NAMES), releases=1,
+        kinds=("ditch", "embankment"), budget=2000.0, record=tmp_path,
+    )  # fmt: skip
+    batch.reset(seed=1)
+    for _ in NAMES:
+        batch.step(np.stack([MIDDLE, MIDDLE]).astype(np.float32))
+    batch.close()
+    folders = sorted(folder.name for folder in tmp_path.iterdir())
+    assert folders == ["episode-000000", "episode-000000-2"]
+
+
+@pytest.mark.parametrize("batched", [False, True])
+def test_a_truncated_episode_is_recorded_when_the_next_begins(
+    tmp_path: Path, batched: bool
+) -> None:
+    asked: list[int] = []
+
+    def trigger(episode: int) -> bool:
+        asked.append(episode)
+        return episode != 1
+
+    terms = {
+        "site": list(NAMES), "releases": 1, "kinds": ("ditch", "embankment"), "budget": 2000.0,
+        "record": tmp_path, "record_trigger": trigger, "max_episode_steps": 1,
+    }  # fmt: skip
+    if batched:
+        env = gymnasium.make_vec(
+            "rigdda/Corridor-v0", 1, autoreset_mode="Disabled",
+            vectorization_mode="vector_entry_point", **terms,
+        )  # fmt: skip
+        folder, action = tmp_path / "copy-0", MIDDLE[None].astype(np.float32)
+    else:
+        env = gymnasium.make("rigdda/Corridor-v0", **terms)
+        folder, action = tmp_path, MIDDLE.astype(np.float32)
+
+    def episodes() -> dict[str, list[str]]:
+        found = sorted(folder.glob("episode-*"))
+        return {one.name: sorted(file.name for file in one.iterdir()) for one in found}
+
+    only = ["section-0001.rrd"]
+    env.reset(seed=1)
+    for number in range(3):
+        *_, terminated, truncated, _ = env.step(action)
+        assert truncated and not terminated and asked == [*range(number + 1)]
+        if number < 2:
+            env.reset()
+            assert episodes() == {"episode-000000": only}
+    env.close()
+    assert episodes() == {"episode-000000": only, "episode-000002": only}
+
+
+def test_an_episode_without_steps_has_no_number(tmp_path: Path) -> None:
+    env = make(record=tmp_path)
+    env.reset(seed=0)
+    env.reset()
+    env.close()
+    assert not [*tmp_path.iterdir()]
+
+
+def test_kinds_need_to_fit_the_own_sites_only() -> None:
+    env = make(site=["old-fence"], kinds=["removal"], releases=1, budget=3000.0)
+    env.reset(seed=0)
+    *_, info = env.step(np.ones(env.action_space.shape))
+    assert {barrier.kind for barrier in info["layout"]} <= {"removal"}
+    with pytest.raises(BadInput, match=r"kinds = .*quick has no existing barrier"):
+        make(site=["quick"], kinds=["removal"])
+
+
+def test_the_info_is_that_of_the_design_environment_without_targets() -> None:
+    _, info = gymnasium.make("rigdda/BarrierDesign-v0", site="quick").reset(seed=0)
+    env = make()
+    own = {"section", "length", "money", "metres", "spent", "gain"}
+    assert {*env.reset(seed=0)[1]} == {*info} - {"targets"} | own
+    assert {*env.step(MIDDLE)[-1]} == {*info} - {"targets"} | own
+
+
 def test_sections_of_a_corridor_are_all_played() -> None:
     quick = Site.load("quick")
     sections = tuple(CorridorSection(quick, 10.0 * (i + 1), f"km {i}") for i in range(3))

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from rigdda.envs import Targets, intervals
 from rigdda.envs import cost as costs
-from rigdda.envs import intervals
 from rigdda.envs.cost import Account, Facts
-from rigdda.envs.intervals import Known, Mean, cost, estimate, mid_p, pair, student_interval, total
+from rigdda.envs.intervals import (
+    Estimate,
+    Known,
+    Mean,
+    cost,
+    estimate,
+    mid_p,
+    pair,
+    student_interval,
+    total,
+)
+from rigdda.envs.problem import MISSED
 
 
 def test_none_of_n_has_three_over_n_as_its_upper_end() -> None:
@@ -39,6 +51,33 @@ def test_one_sided_bounds_are_clopper_and_pearson_s() -> None:
         assert seen.floor == pytest.approx(exact.low)
         assert seen.count == count
     assert estimate(0, 59).bound < 0.05 < estimate(0, 58).bound
+
+
+@pytest.mark.parametrize("events", [("a",), ("a", "b")])
+@pytest.mark.parametrize("releases", [1, 30, 59])
+def test_a_sound_layout_misses_a_target_in_5_percent_for_each_event(
+    events: tuple[str, ...], releases: int
+) -> None:
+    """Counted over all that may be seen by a layout that meets its target exactly."""
+    counts = range(releases + 1)
+    seen = [estimate(k, releases) for k in counts]
+    shares = []
+    for p in (0.01, 0.02, 0.05, 0.2):
+        chances = stats.binom.pmf(counts, releases, p)
+        shares.append(
+            sum(
+                math.prod(chances[k] for k in drawn)
+                for drawn in itertools.product(counts, repeat=len(events))
+                if decide_all(events, [seen[k] for k in drawn], p) == MISSED
+            )
+        )
+    assert 0.0 < max(shares) <= 0.05 * len(events)
+    assert len(events) == 1 or releases < 30 or max(shares) > 0.05
+
+
+def decide_all(events: tuple[str, ...], seen: list[Estimate], target: float) -> str | None:
+    """Return whether the probabilities of all events are at most a target."""
+    return Targets(reach=target).state(events, dict(zip(events, seen, strict=True)), {})
 
 
 def test_without_releases_nothing_is_known() -> None:

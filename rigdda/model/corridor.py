@@ -9,8 +9,10 @@ A corridor is a TOML file with a name, a budget and sections; each section has a
     site = "verge-301"                # a name or a file
     length = 120.0                    # m
 
-Instead of tables, `table = "sections.csv"` names a CSV file with one row per section. Prices and
-consequences in the corridor file replace those of every site, and so does the traffic.
+Instead of tables, `table = "sections.csv"` names a CSV file with one row per section. Each price
+and consequence in the corridor file replaces that of every site; the others remain. The traffic in
+the corridor file replaces that of every site. The length of road in the traffic is always that of
+the section.
 """
 
 from __future__ import annotations
@@ -131,10 +133,11 @@ class CorridorFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         ),
     ] | None = None  # fmt: skip
     prices: Annotated[
-        dict[str, Any], about("Prices that replace those of every site, see the site file.")
+        dict[str, Any],
+        about("Prices that replace those of every site, each by its key, see the site file."),
     ] = {}  # msgspec copies it
     consequences: Annotated[
-        dict[str, Any], about("Consequences that replace those of every site.")
+        dict[str, Any], about("Consequences that replace those of every site, each by its key.")
     ] = {}
     traffic: Annotated[
         dict[str, Any] | None,
@@ -151,7 +154,8 @@ class CorridorSection(msgspec.Struct, frozen=True):
     Parameters
     ----------
     site : Site
-        The slope, with the prices of the corridor.
+        The slope, with the prices of the corridor. If it has traffic, the `section_length` of the
+        traffic becomes the length of the section.
     length : float
         Length of road [m].
     name : str
@@ -180,6 +184,10 @@ class CorridorSection(msgspec.Struct, frozen=True):
         table = SectionTable(self.site.name, self.length, self.name, **self.targets)
         for name in ("length", *TARGETS):
             msgspec.structs.force_setattr(self, name, getattr(table, name))
+        if self.site.traffic is not None:
+            replace = msgspec.structs.replace
+            traffic = replace(self.site.traffic, section_length=self.length)
+            msgspec.structs.force_setattr(self, "site", replace(self.site, traffic=traffic))
 
     @property
     def targets(self) -> dict[str, float | None]:
@@ -248,18 +256,7 @@ class Corridor(msgspec.Struct, frozen=True):
         BadInput
             If there is no such file or name, or the file is not a valid corridor.
         """
-        if not isinstance(source, str | os.PathLike):
-            raise BadInput("corridor", source, "name a TOML file or a built-in corridor")
-        path = Path(source)
-        if path.suffix != ".toml" and not is_file(path):
-            if str(source) not in names():
-                hint = f"name a TOML file or one of {', '.join(names())}"
-                raise BadInput("corridor", str(source), hint)
-            text = (FOLDER / f"{source}.toml").read_text(encoding="utf-8")
-            return _corridor(fields.parse("corridor", str(source), text), Path())
-        if not is_file(path):
-            raise BadInput("corridor", str(source), "name an existing TOML file")
-        return _corridor(fields.parse("corridor", str(path), read("corridor", path)), path.parent)
+        return _corridor(*_parsed(source))
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
         """Write the corridor and the sites of its sections into a folder; return the TOML file.
@@ -305,6 +302,19 @@ def is_corridor(path: str | os.PathLike[str]) -> bool:
     return "sections" in data or "table" in data
 
 
+def site_files(source: str | os.PathLike[str]) -> tuple[Path, ...]:
+    """Return the site files of a corridor, each once; other sites have no file.
+
+    Raises
+    ------
+    BadInput
+        As `Corridor.load` does.
+    """
+    file, folder = _parsed(source)
+    texts = (table.site for table in _tables(file, folder))
+    return tuple(folder / text for text in dict.fromkeys(texts) if text.endswith(".toml"))
+
+
 def checked_budgets(field: str, budgets: Any) -> tuple[float, ...]:
     """Return budgets [EUR] as an increasing tuple; `field` names them in messages.
 
@@ -320,16 +330,38 @@ def checked_budgets(field: str, budgets: Any) -> tuple[float, ...]:
     return tuple(sorted(found))
 
 
-def _corridor(data: dict[str, Any], folder: Path) -> Corridor:
-    """Return the corridor of a parsed file; file names in it are relative to `folder`."""
-    file = CorridorFile(**fields.checked(CorridorFile, data))
+def _parsed(source: str | os.PathLike[str]) -> tuple[CorridorFile, Path]:
+    """Return the tables of a corridor file, and the folder to which its file names are relative."""
+    if not isinstance(source, str | os.PathLike):
+        raise BadInput("corridor", source, "name a TOML file or a built-in corridor")
+    path = Path(source)
+    if path.suffix != ".toml" and not is_file(path):
+        if str(source) not in names():
+            hint = f"name a TOML file or one of {', '.join(names())}"
+            raise BadInput("corridor", str(source), hint)
+        text, folder = (FOLDER / f"{source}.toml").read_text(encoding="utf-8"), Path()
+    elif not is_file(path):
+        raise BadInput("corridor", str(source), "name an existing TOML file")
+    else:
+        text, folder = read("corridor", path), path.parent
+    data = fields.parse("corridor", str(source), text)
+    return CorridorFile(**fields.checked(CorridorFile, data)), folder
+
+
+def _tables(file: CorridorFile, folder: Path) -> tuple[SectionTable, ...]:
+    """Return the sections of a corridor file, which may be in a CSV file."""
     if bool(file.table) == bool(file.sections):
         hint = 'give either tables [[sections]] or table = "sections.csv"'
         raise BadInput("sections", len(file.sections), hint)
+    return _rows(folder / file.table) if file.table else file.sections
+
+
+def _corridor(file: CorridorFile, folder: Path) -> Corridor:
+    """Return the corridor of a file; file names in it are relative to `folder`."""
+    tables = _tables(file, folder)
     if file.traffic and "section_length" in file.traffic:
         hint = "leave it out: it is the length of each section"
         raise BadInput("traffic.section_length", file.traffic["section_length"], hint)
-    tables = _rows(folder / file.table) if file.table else file.sections
     sites: dict[str, Site] = {}
     sections = []
     for i, table in enumerate(tables):
@@ -359,9 +391,12 @@ def _priced(site: Site, file: CorridorFile) -> Site:
     """Return a site with the prices and consequences of the corridor."""
     changed: dict[str, Any] = {}
     for name, table in (("prices", Prices), ("consequences", Consequences)):
-        given = fields.checked(table, getattr(file, name), name)
+        own, given = getattr(site, name), fields.checked(table, getattr(file, name), name)
+        for key, value in given.items():
+            if isinstance(value, dict):
+                given[key] = getattr(own, key) | value
         if given:
-            changed[name] = msgspec.structs.replace(getattr(site, name), **given)
+            changed[name] = msgspec.structs.replace(own, **given)
     return msgspec.structs.replace(site, **changed) if changed else site
 
 

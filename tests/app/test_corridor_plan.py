@@ -69,16 +69,34 @@ def test_the_optimum_is_that_of_an_enumeration(
 
 
 @settings(max_examples=60, deadline=None)
-@given(fronts, st.floats(0.0, 300.0))
-def test_simple_methods_stay_within_the_budget_and_are_not_better(
-    rows: list[Row], budget: float
+@given(fronts, st.floats(0.0, 300.0), st.none() | st.floats(0.5, 20.0))
+def test_simple_methods_stay_within_the_budgets_and_are_not_better(
+    rows: list[Row], budget: float, yearly: float | None
 ) -> None:
     given = options(rows)
-    best = enumerated(given, budget)
+    limit = math.inf if yearly is None else yearly
+    best = enumerated(given, budget, limit)
     for method in SIMPLE_METHODS.values():
-        choice = method(given, budget)
+        choice = method(given, budget, yearly)
         assert given.total(choice, given.costs) <= budget * (1.0 + 1e-6) + 1e-6
+        assert given.total(choice, given.annual) <= limit * (1.0 + 1e-6) + 1e-6
         assert given.total(choice, given.values) >= best - 1e-6
+
+
+def test_simple_methods_are_limited_by_the_yearly_budget() -> None:
+    given = options([[(10.0, 50.0), (40.0, 20.0)], [(10.0, 60.0), (40.0, 40.0)]])
+    for method in SIMPLE_METHODS.values():
+        assert method(given, 1000.0) == (2, 2)
+        assert method(given, 1000.0, 0.0) == (0, 0)
+        assert method(given, 1000.0, 1.0) == (1, 1) or method is programme.worst_first
+    assert programme.worst_first(given, 1000.0, 2.0) == (2, 0)
+
+
+def test_next_steps_keep_the_yearly_budget_and_the_targets() -> None:
+    given = options([[(10.0, 50.0), (40.0, 20.0)]], [[0.1, 0.1, 0.2]])
+    steps = [step.after for step in planning._following(given, (0,), None)]
+    assert steps == [1]  # the other option misses a target more
+    assert planning._following(given, (0,), 0.4) == ()  # it costs 0.5 a year
 
 
 @settings(max_examples=40, deadline=None)
@@ -218,6 +236,132 @@ def test_the_command_writes_what_its_tables_say(planned: tuple[Path, str]) -> No
     assert "km 1.2" in words and "unlimited" in words
 
 
+def test_layouts_are_told_with_their_places(planned: tuple[Path, str]) -> None:
+    out, words = planned
+    layout = load_layout(out / "layouts/budget-2/section-1.toml")
+    assert layout
+    placed = f"at x = {layout[0].x:.1f} m"
+    section = next(r for r in rows(out / "sections.csv") if r["budget"] == "12000.0")
+    assert placed in section["layout"] and placed in " ".join(words.split())
+    fronts = [(row["section"], row["layout"]) for row in rows(out / "fronts.csv")]
+    assert all("at x = " in layout or layout == "nothing" for _, layout in fronts)
+    assert len(set(fronts)) == len(fronts)
+    assert "at x = " in rows(out / "priorities.csv")[0]["build"]
+
+
+def test_the_corridor_is_kept_as_it_was_used(planned: tuple[Path, str], tmp_path: Path) -> None:
+    out, _ = planned
+    copy = out / "corridor-as-used/corridor.toml"
+    assert Corridor.load(copy) == Corridor.load(out.parent / "pass.toml")
+    run("corridor", copy, *SMALL, "--out", "again", folder=tmp_path)
+    for name in ("budgets.csv", "sections.csv"):
+        assert (tmp_path / "again" / name).read_bytes() == (out / name).read_bytes()
+    run("report", out, "--out", "page", folder=tmp_path)
+    page = (tmp_path / "page/report.html").read_text(encoding="utf-8")
+    assert "the folder corridor-as-used has the corridor" in page
+    assert "and the site as it was used" not in page
+
+
+def test_files_of_an_earlier_run_do_not_remain(tmp_path: Path) -> None:
+    (tmp_path / "pass.toml").write_text(TEXT)
+    few = ("--releases", 200, "--out", "o")
+    run("corridor", "pass.toml", *few, folder=tmp_path)
+    out, (one, _, _) = tmp_path / "o", TEXT.partition('[[sections]]\nsite = "narrow"')
+    own = [out / name for name in ("layouts/mine.toml", "layouts/budget-1/section-02.toml",
+                                   "corridor-as-used/site-b.toml")]  # fmt: skip
+    for file in own:
+        file.write_text("mine")
+    (tmp_path / "pass.toml").write_text(one)
+    run("corridor", "pass.toml", "--budget", 4_000, *few, folder=tmp_path)
+    for folder in ("layouts", "corridor-as-used"):
+        found = {file for file in (out / folder).rglob("*") if file.is_file()}
+        assert {file for file in found if file not in own} == {
+            out / name
+            for name in ("layouts/budget-1/section-1.toml", "corridor-as-used/corridor.toml",
+                         "corridor-as-used/site-1.toml")
+            if name.startswith(folder)
+        }  # fmt: skip
+    assert all(file.read_text() == "mine" for file in own)
+    assert not (out / "layouts/budget-2").exists()
+
+
+TARGETED = """name = "targets"
+budget = [0, 12_000, 2_000_000]
+[[sections]]
+site = "own.toml"
+length = 60.0
+name = "km 1.2"
+reach = 0.05
+[[sections]]
+site = "quick"
+length = 140.0
+reach = 0.05
+"""
+
+
+@pytest.fixture(scope="module")
+def targeted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """Return results for targets that no layout meets, and what was printed."""
+    folder = tmp_path_factory.mktemp("targets")
+    Site.load("verge").save(folder / "own.toml")
+    text = (folder / "own.toml").read_text(encoding="utf-8")
+    marked = "# Name of the site; placeholder: replace.\n" + text
+    (folder / "own.toml").write_text(marked, encoding="utf-8")
+    (folder / "pass.toml").write_text(TARGETED)
+    words = run("corridor", "pass.toml", "--releases", 200, "--out", "o", folder=folder)
+    return folder / "o", words
+
+
+def test_targets_and_their_cost_are_told(targeted: tuple[Path, str]) -> None:
+    out, words = targeted
+    assert "Money is spent on targets first" in words
+    assert "even with unlimited money, these sections may miss a target: km 1.2, quick" in words
+    budgets = rows(out / "budgets.csv")
+    whole = next(row for row in budgets if row["budget"] == "unlimited")
+    assert float(whole["gain"]) <= 0.0
+    assert all(row["share_of_unlimited"] == "" for row in budgets)
+    assert all(row["sections_missing_targets"] == "2" for row in budgets)
+    line = next(line for line in words.splitlines() if line.startswith(" unlimited"))
+    assert line.split()[-5:-1] == ["-"] * 4
+
+
+def test_sections_without_a_gain_that_is_shown_are_named(targeted: tuple[Path, str]) -> None:
+    out, words = targeted
+    lines = [line for line in words.splitlines() if "it is not shown that the barriers" in line]
+    told = {line.partition(" EUR")[0].removeprefix("with ").replace(",", ""): line
+            for line in lines}  # fmt: skip
+    for row in rows(out / "sections.csv"):
+        low, gain, high = (float(row[name]) for name in ("gain_low", "gain", "gain_high"))
+        assert low <= gain <= high
+        if row["budget"] != "unlimited":
+            doubtful = row["layout"] != "nothing" and low <= 0.0
+            line = told.get(f"{float(row['budget']):.0f}", "")
+            assert (f"{row['section']} (" in line) == doubtful
+    assert "2000000" in told
+
+
+def test_the_shown_budget_builds_something(targeted: tuple[Path, str]) -> None:
+    _, words = targeted
+    assert "what a budget of 12,000 EUR builds" in words
+
+
+def test_placeholders_of_sites_are_told(targeted: tuple[Path, str]) -> None:
+    _, words = targeted
+    assert words.count("placeholders") == 1
+    assert "the site file own.toml marks 1 values as placeholders to replace" in words
+
+
+def test_a_yearly_budget_limits_all_methods(planned: tuple[Path, str], tmp_path: Path) -> None:
+    free = rows(planned[0] / "budgets.csv")
+    limit = 0.5 * float(free[-1]["annual_cost_of_barriers"])
+    (tmp_path / "pass.toml").write_text(f"yearly_budget = {limit}\n{TEXT}")
+    words = run("corridor", "pass.toml", *SMALL, "--out", "o", folder=tmp_path)
+    budgets = rows(tmp_path / "o/budgets.csv")
+    assert all(float(r["annual_cost_of_barriers"]) <= limit * (1.0 + 1e-6) for r in budgets)
+    assert all(row["shadow_price"] == "" for row in budgets)
+    assert "All methods keep the yearly budget" in words
+
+
 def test_the_report_shows_what_each_budget_achieves(
     planned: tuple[Path, str], tmp_path: Path
 ) -> None:
@@ -275,6 +419,32 @@ def test_sections_may_stand_in_a_table_and_share_prices(tmp_path: Path) -> None:
     assert [s.reach for s in found.sections] == [None, 0.1]
     assert all(s.site.consequences.closure == 7000.0 for s in found.sections)
     assert all(s.site.prices.interest == 0.01 for s in found.sections)
+
+
+def test_prices_of_a_corridor_replace_those_of_the_same_key(tmp_path: Path) -> None:
+    prices = (
+        "[prices]\nupkeep = { fence = 0.02 }\nfence = { 500 = 100.0 }\nditch = { soil = 9.0 }\n"
+    )
+    (tmp_path / "pass.toml").write_text(TEXT + prices)
+    for section in Corridor.load(tmp_path / "pass.toml").sections:
+        own, new = Site.load(section.site.name).prices, section.site.prices
+        assert new.upkeep == own.upkeep | {"fence": 0.02}
+        assert new.fence == own.fence | {"500": 100.0}
+        assert new.ditch == own.ditch | {"soil": 9.0}
+        assert replace(new, upkeep=own.upkeep, fence=own.fence, ditch=own.ditch) == own
+
+
+def test_traffic_of_a_site_takes_the_length_of_its_section(tmp_path: Path) -> None:
+    traffic = "[traffic]\nvehicles_per_day = 900\nspeed = 50.0\n"
+    site = Site.load("verge")
+    other = rigdda.Traffic(vehicles_per_day=900.0, speed=50.0, section_length=1000.0)
+    replace(site, traffic=other).save(tmp_path / "own.toml")
+    text = TEXT.replace('"narrow"', '"own.toml"').replace('"verge"', '"own.toml"')
+    (tmp_path / "pass.toml").write_text(text)
+    own = Corridor.load(tmp_path / "pass.toml")
+    (tmp_path / "pass.toml").write_text(text + traffic)
+    assert own == Corridor.load(tmp_path / "pass.toml")
+    assert [s.site.traffic.section_length for s in own.sections if s.site.traffic] == [100.0, 50.0]
 
 
 def test_the_example_has_targets_and_traffic_of_its_sections() -> None:

@@ -105,16 +105,20 @@ class Option:
         return (mean.high - mean.low) / (2.0 * DEVIATIONS)
 
     def missed(self, problem: DesignProblem) -> float:
-        """Return the largest excess of an upper bound over its target, see `Targets` [-]."""
+        """Return the largest excess of an upper bound over its target, see `Targets` [-].
+
+        All releases of the layout count, including those that do not affect any choice.
+        """
         over, targets = [0.0], problem.targets
+        known = [*self.batches, *([self.report] if self.report is not None else [])]
         for event in problem.site.events:
             if event.design:
                 for wanted, name in ((targets.reach, "reach"), (targets.failure, "failure")):
                     if wanted is not None:
-                        seen = [getattr(e, name)[event.name] for e in self.batches]
+                        seen = [getattr(e, name)[event.name] for e in known]
                         over.append(_joined(seen).bound - wanted)
         if targets.individual is not None:
-            risks = [(e.risk.individual, e.releases) for e in self.batches if e.risk is not None]
+            risks = [(e.risk.individual, e.releases) for e in known if e.risk is not None]
             over.append(excess(joined(risks).high, targets.individual))
         return max(over)
 
@@ -142,20 +146,22 @@ class BudgetPlan:
         Evaluation of the chosen layouts on releases that did not affect any choice.
     methods : dict of str to CorridorEvaluation
         Evaluations of the choices of the simple methods, on the same releases.
-    shadow_price : float
-        Saving per year of one more euro of the budget [1/year].
+    shadow_price : float or None
+        Saving per year of one more euro of the budget [1/year], None if there is a yearly budget.
     following : tuple of Increment
-        Next steps of the sections that would pay if there were more money, the best first.
-    missed : tuple of float
-        Amount by which each section misses its targets [-].
+        Next steps of the sections that would pay if there were more money, the best first. The
+        yearly budget allows each of them alone.
+    missed : dict of str to tuple of float
+        Amount by which each section misses its targets with the choice of each method [-], see
+        `Option.missed`.
     """
 
     budget: float
     evaluation: CorridorEvaluation
     methods: dict[str, CorridorEvaluation]
-    shadow_price: float
+    shadow_price: float | None
     following: tuple[Increment, ...]
-    missed: tuple[float, ...]
+    missed: dict[str, tuple[float, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -367,32 +373,33 @@ class Planner:
     def _choose(self) -> CorridorPlan:
         """Choose for every budget, and evaluate what was chosen on new releases."""
         corridor, options = self.problem.corridor, self.options()
+        yearly = corridor.yearly_budget
         unlimited = math.fsum(float(own.max()) for own in options.costs)
         budgets = [*corridor.budgets, unlimited]
         scenarios = self._scenarios() if self.robust else None
         choices: list[dict[str, Choice]] = []
         for budget in budgets:
             self._tick(self.used, "choosing")
-            best = programme.optimum(options, budget, corridor.yearly_budget, scenarios)
-            others = {name: method(options, budget) for name, method in SIMPLE_METHODS.items()}
+            best = programme.optimum(options, budget, yearly, scenarios)
+            others = {
+                name: method(options, budget, yearly) for name, method in SIMPLE_METHODS.items()
+            }
             choices.append({OPTIMUM: best, **others})
         self._report({(s, k) for own in choices for c in own.values() for s, k in enumerate(c)})
+        known = self.options()
         plans = []
         for budget, own in zip(budgets, choices, strict=True):
-            best = own[OPTIMUM]
+            price = programme.shadow_price(options, budget) if yearly is None else None
             plans.append(
                 BudgetPlan(
                     budget=budget,
-                    evaluation=self._judged(best),
+                    evaluation=self._judged(own[OPTIMUM]),
                     methods={name: self._judged(own[name]) for name in SIMPLE_METHODS},
-                    shadow_price=programme.shadow_price(options, budget),
-                    following=_following(options, best),
-                    missed=tuple(
-                        float(table[k] / length) for table, k, length in
-                        zip(options.missed, best, options.lengths, strict=True)
-                    ),
+                    shadow_price=price,
+                    following=_following(options, own[OPTIMUM], yearly),
+                    missed={name: _missed(known, choice) for name, choice in own.items()},
                 )
-            )  # fmt: skip
+            )
         fronts = tuple(map(tuple, self.fronts))
         return CorridorPlan(self.problem, fronts, tuple(plans), self.used)
 
@@ -450,18 +457,28 @@ def _write(file: Path | None, layouts: Sequence[Layout]) -> None:
             part.write_bytes(msgspec.json.encode([to_tables(layout) for layout in layouts]))
 
 
-def _following(options: Options, choice: Choice) -> tuple[Increment, ...]:
+def _missed(options: Options, choice: Choice) -> tuple[float, ...]:
+    """Return the amount by which each section misses its targets with a choice [-]."""
+    rows = zip(options.missed, choice, options.lengths.tolist(), strict=True)
+    return tuple(float(own[k] / length) for own, k, length in rows)
+
+
+def _following(options: Options, choice: Choice, yearly: float | None) -> tuple[Increment, ...]:
     """Return the next step of each section from its choice that would pay, the best first.
 
-    The next step is that with the greatest saving per additional construction cost.
+    The next step is that with the greatest saving per additional construction cost, of those that
+    do not miss the targets more and that the yearly budget allows.
     """
-    found = []
+    found, left = [], programme.spare(options, choice, yearly)
     for s, k in enumerate(choice):
+        allowed = (options.missed[s] <= options.missed[s][k]) & (
+            options.annual[s] - options.annual[s][k] <= left
+        )
         cost, value = (
             options.costs[s] - options.costs[s][k],
             options.values[s][k] - options.values[s],
         )
-        better = [j for j in range(len(cost)) if cost[j] > 0.0 and value[j] > 0.0]
+        better = [j for j in range(len(cost)) if allowed[j] and cost[j] > 0.0 and value[j] > 0.0]
         if better:
             j = max(better, key=lambda i: value[i] / cost[i])
             found.append(Increment(s, k, j, float(cost[j]), float(value[j])))

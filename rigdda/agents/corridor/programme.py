@@ -166,7 +166,7 @@ def shadow_price(options: Options, budget: float) -> float:
     """Return what one more euro of the budget would save each year [1/year].
 
     It is the multiplier of the budget in the linear relaxation, in which a section may be divided
-    between options.
+    between options, without targets and without a yearly budget.
     """
     steps = increments(options)
     left = budget
@@ -233,51 +233,85 @@ def _slope(costs: Floats, values: Floats, i: int, k: int) -> float:
     return float((values[k] - values[i]) / (costs[k] - costs[i]))
 
 
-def by_ratio(options: Options, budget: float) -> Choice:
-    """Return the choice of the steps with the greatest saving per cost that the budget allows.
+def spare(options: Options, choice: Sequence[int], yearly: float | None) -> float:
+    """Return the annual cost by which a choice is below the yearly budget [EUR/year], at least 0.
 
-    A step that the money left does not allow ends the improvement of its section.
+    Without a yearly budget, it is infinite.
+    """
+    if yearly is None:
+        return math.inf
+    return max(0.0, yearly - options.total(choice, options.annual))
+
+
+def by_ratio(options: Options, budget: float, yearly: float | None = None) -> Choice:
+    """Return the choice of the steps with the greatest saving per cost that both budgets allow.
+
+    A step that the money left does not allow ends the improvement of its section. Targets are
+    ignored.
     """
     choice, left, ended = list(options.nothing), budget, set()
+    left_yearly = spare(options, choice, yearly)
     for step in increments(options):
         if step.section in ended:
             continue
-        if step.cost <= left * (1.0 + BUDGET_ROUNDING):
+        annual = options.annual[step.section]
+        more = float(annual[step.after] - annual[step.before])
+        if step.cost <= _limit(left) and more <= _limit(left_yearly):
             choice[step.section] = step.after
             left -= step.cost
+            left_yearly -= more
         else:
             ended.add(step.section)
     return tuple(choice)
 
 
-def same_money(options: Options, budget: float) -> Choice:
-    """Return the best option of each section for the same money per metre of road."""
-    each = budget * options.lengths / options.lengths.sum()
-    return tuple(_best(options, s, float(each[s])) for s in range(len(each)))
+def same_money(options: Options, budget: float, yearly: float | None = None) -> Choice:
+    """Return the best option of each section for the same money per metre of road.
+
+    The yearly budget is divided in the same way.
+    """
+    shares = (options.lengths / options.lengths.sum()).tolist()
+    left = spare(options, options.nothing, yearly)
+    return tuple(_best(options, s, budget * own, left * own) for s, own in enumerate(shares))
 
 
-def worst_first(options: Options, budget: float) -> Choice:
+def worst_first(options: Options, budget: float, yearly: float | None = None) -> Choice:
     """Return the best options that the money left allows, for the worst sections first.
 
     The worst section is that with the greatest cost per metre without barriers.
     """
     choice, left = list(options.nothing), budget
+    left_yearly = spare(options, choice, yearly)
     worst = np.argsort([-own[0] for own in options.values] / options.lengths, kind="stable")
     for s in worst.tolist():
-        choice[s] = _best(options, s, left)
+        choice[s] = _best(options, s, left, left_yearly)
         left -= float(options.costs[s][choice[s]])
+        left_yearly -= float(options.annual[s][choice[s]] - options.annual[s][0])
     return tuple(choice)
 
 
-def _best(options: Options, s: int, money: float) -> int:
-    """Return the option of a section with the least total cost that an amount of money allows."""
-    within = np.flatnonzero(options.costs[s] <= money * (1.0 + BUDGET_ROUNDING))
+def _limit(money: float) -> float:
+    """Return the greatest cost that an amount of money allows, with a tolerance for rounding."""
+    return max(0.0, money) * (1.0 + BUDGET_ROUNDING)
+
+
+def _best(options: Options, s: int, money: float, yearly: float) -> int:
+    """Return the best option of a section that an amount of money allows.
+
+    It is the one that misses the targets least, and among these the one with the least total cost.
+    `yearly` limits its annual cost in addition to that of the first option [EUR/year].
+    """
+    more = options.annual[s] - options.annual[s][0]
+    within = np.flatnonzero((options.costs[s] <= _limit(money)) & (more <= _limit(yearly)))
     return int(within[np.lexsort((options.values[s][within], options.missed[s][within]))[0]])
 
+
+RATIO = "saving per cost"
+"""Name of the simple method that ignores targets."""
 
 SIMPLE_METHODS = {
     "same money per metre": same_money,
     "worst section first": worst_first,
-    "saving per cost": by_ratio,
+    RATIO: by_ratio,
 }
 """Simple methods by name."""

@@ -14,6 +14,7 @@ from rigdda.app.terminal import (
     executor_option,
     finding,
     folder_for,
+    note,
     out_option,
     progress,
     recorded_run,
@@ -52,17 +53,21 @@ def corridor(
 
     Writes budgets.csv, sections.csv, fronts.csv (all layouts), priorities.csv (what should be built
     next), the folder layouts, and pictures: gain.png (gain against budget) and strip.png (what is
-    built where). An interrupted run continues where it stopped.
+    built where). The folder corridor-as-used keeps the corridor and its sites. An interrupted run
+    continues where it stopped.
     """
     from msgspec.structs import replace
 
     import rigdda
     from rigdda.agents.corridor.planning import Planner
+    from rigdda.app import site_check
     from rigdda.app.released import released
     from rigdda.app.reports import corridor_report as report
     from rigdda.envs import CorridorProblem
+    from rigdda.model.corridor import site_files
 
     where = rigdda.Corridor.load(file)
+    files = site_files(file)
     sections = tuple(replace(section, site=released(section.site)) for section in where.sections)
     where = replace(where, sections=sections)
     if budgets:
@@ -72,6 +77,7 @@ def corridor(
     stored = folder / "evaluations"
     stored.mkdir(exist_ok=True)
     with recorded_run(folder), progress(releases * len(where.sections)) as tick:
+        report.keep_corridor(where, folder)
         plan = Planner(problem, releases, seed, robust, stored, tick).plan()
         report.write(plan, folder)
     click.echo(
@@ -80,6 +86,16 @@ def corridor(
         "for every metre, with the worst section first, and with the greatest saving per cost\n"
         "first; 1 EUR: what one more EUR would save each year."
     )
+    if report.has_targets(plan):
+        finding(
+            "Money is spent on targets first, even where this saves nothing; the method of the "
+            "greatest saving per cost (ratio) and the saving of one more EUR ignore targets."
+        )
+    if where.yearly_budget is not None:
+        finding(
+            "All methods keep the yearly budget, also with unlimited money. What one more EUR "
+            "would save is not computed with a yearly budget."
+        )
     show(report.table_of_budgets(plan))
     own = report.shown_budget(plan)
     click.echo(
@@ -88,12 +104,22 @@ def corridor(
     )
     show(report.table_of_sections(plan, own))
     for one in plan.plans[:-1]:
-        if missing := report.sections_that_miss(plan, one):
+        if doubtful := report.not_shown_to_save(plan, one):
             finding(
-                f"with {one.budget:,.0f} EUR, these sections may miss a target: "
-                f"{', '.join(missing)}"
+                f"with {one.budget:,.0f} EUR, it is not shown that the barriers of these sections "
+                f"save more than they cost: {', '.join(doubtful)}"
             )
+    for one in plan.plans:
+        if missing := report.sections_that_miss(plan, one):
+            money = f"with {one.budget:,.0f} EUR"
+            if one is plan.unlimited:
+                money = "even with unlimited money"
+            finding(f"{money}, these sections may miss a target: {', '.join(missing)}")
+    for path in files:
+        if left := site_check.placeholders(str(path)):
+            note(f"the site file {path} marks {len(left)} values as placeholders to replace")
     click.echo(
         f"{len(where.sections)} sections, {where.length:,.0f} m, {plan.releases:,} releases; "
-        f"{', '.join(report.CORRIDOR_FILES)} and layouts are in {folder}"
+        f"{', '.join(report.CORRIDOR_FILES)}, layouts "
+        f"and {report.CORRIDOR_COPY} are in {folder}"
     )

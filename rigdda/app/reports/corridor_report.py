@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Sequence, Set
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +11,14 @@ import numpy as np
 
 import rigdda
 from rigdda.agents.corridor.planning import OPTIMUM, BudgetPlan, CorridorPlan
+from rigdda.agents.corridor.programme import RATIO
 from rigdda.app.reports.pictures import DPI, EVENTS, FONT, save
 from rigdda.app.reports.tables import empty_table, write_rows
 from rigdda.app.reports.wording import euros, percent
-from rigdda.barriers import KINDS
+from rigdda.barriers import KINDS, Built
 from rigdda.display import ROAD
+from rigdda.envs.corridor_problem import difference
+from rigdda.envs.intervals import Mean
 from rigdda.rounding import Rounding
 
 if TYPE_CHECKING:
@@ -32,6 +36,9 @@ CORRIDOR_FILES = (
 )
 """Files that `write` writes besides the folder `layouts`."""
 
+CORRIDOR_COPY = "corridor-as-used"
+"""Folder with the corridor and its sites as they were used, see `rigdda.Corridor.save`."""
+
 PRIORITIES = (
     "budget", "priority", "section", "instead_of", "build", "additional_cost",
     "waiting_costs_per_year", "saving_per_euro",
@@ -48,28 +55,64 @@ def write(plan: CorridorPlan, out: Path) -> None:
     write_rows(out / "sections.csv", section_rows(plan))
     write_rows(out / "fronts.csv", front_rows(plan))
     write_rows(out / "priorities.csv", priority_rows(plan), PRIORITIES)
+    written = set()
     for i, own in enumerate(plan.plans[:-1]):
         folder = out / "layouts" / f"budget-{i + 1}"
         folder.mkdir(parents=True, exist_ok=True)
         for s, evaluation in enumerate(own.evaluation.sections):
-            rigdda.save_layout(evaluation.layout, folder / f"section-{s + 1}.toml")
+            file = folder / f"section-{s + 1}.toml"
+            rigdda.save_layout(evaluation.layout, file)
+            written.add(file)
+    _remove_earlier(out / "layouts", "budget-{}/section-{}.toml", written)
     draw_gain(out / "gain.png", plan)
     draw_strip(out / "strip.png", plan)
 
 
-def share(plan: CorridorPlan, gain: float) -> float:
-    """Return a gain as a share of that of unlimited money [-], 0 if that is not positive."""
+def keep_corridor(corridor: rigdda.Corridor, out: Path) -> None:
+    """Write the corridor and its sites into the folder `CORRIDOR_COPY` of a results folder.
+
+    Raises
+    ------
+    BadInput
+        If a site cannot be represented in TOML.
+    """
+    folder = corridor.save(out / CORRIDOR_COPY).parent
+    files = {folder / f"site-{s + 1}.toml" for s in range(len(corridor.sections))}
+    _remove_earlier(folder, "site-{}.toml", files)
+
+
+def _remove_earlier(folder: Path, form: str, written: Set[Path]) -> None:
+    """Remove the numbered files that an earlier run wrote and the present run did not write.
+
+    `form` is the name of these files, with {} for each number. Other files remain.
+    """
+    named = re.compile(re.escape(form).replace(r"\{\}", "[1-9][0-9]*"))
+    for file in [*folder.glob(form.replace("{}", "*"))]:
+        if named.fullmatch(file.relative_to(folder).as_posix()) and file not in written:
+            file.unlink()
+            if file.parent != folder and not any(file.parent.iterdir()):
+                file.parent.rmdir()
+
+
+def share(plan: CorridorPlan, gain: float) -> float | None:
+    """Return a gain as a share of that of unlimited money [-], None if that is not positive."""
     whole = plan.unlimited.evaluation.gain
-    return gain / whole if whole > 0.0 else 0.0
+    return gain / whole if whole > 0.0 else None
 
 
 def budget_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
-    """Return one row for each budget and method [EUR, EUR/year]."""
+    """Return one row for each budget and method [EUR, EUR/year].
+
+    A cell is empty if its value is not defined: the share if the gain of unlimited money is not
+    positive, and the shadow price of the simple methods or with a yearly budget.
+    """
     rows = []
     for budget_plan in plan.plans:
         limit = "unlimited" if budget_plan is plan.unlimited else budget_plan.budget
         for name, evaluation in {OPTIMUM: budget_plan.evaluation, **budget_plan.methods}.items():
             ahead = plan.problem.ahead(budget_plan.evaluation, evaluation)
+            part = share(plan, evaluation.gain)
+            price = budget_plan.shadow_price if name == OPTIMUM else None
             rows.append(
                 {
                     "budget": limit,
@@ -78,7 +121,7 @@ def budget_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
                     "gain": evaluation.gain,
                     "gain_low": evaluation.gain_ci[0],
                     "gain_high": evaluation.gain_ci[1],
-                    "share_of_unlimited": share(plan, evaluation.gain),
+                    "share_of_unlimited": "" if part is None else part,
                     "behind": ahead.value,
                     "behind_low": ahead.low,
                     "behind_high": ahead.high,
@@ -87,7 +130,8 @@ def budget_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
                     "objective_high": evaluation.ci[1],
                     "annual_cost_of_barriers": evaluation.annual,
                     "sections_built": sum(bool(e.layout) for e in evaluation.sections),
-                    "shadow_price": budget_plan.shadow_price if name == OPTIMUM else "",
+                    "shadow_price": "" if price is None else price,
+                    "sections_missing_targets": sum(x > 0.0 for x in budget_plan.missed[name]),
                 }
             )
     return rows
@@ -100,23 +144,36 @@ def section_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
         limit = "unlimited" if own is plan.unlimited else own.budget
         for s, evaluation in enumerate(own.evaluation.sections):
             section, problem = plan.problem.corridor.sections[s], plan.problem.problems[s]
-            nothing = problem.nothing.objective
+            nothing, gain = problem.nothing.objective, section_gain(plan, own, s)
             rows.append(
                 {
                     "budget": limit,
                     "section": section.name,
                     "length": section.length,
-                    "layout": words(evaluation.layout),
+                    "layout": words(evaluation.layout, section.site),
                     "cost": section.length * evaluation.cost,
-                    "gain": section.length * (nothing - evaluation.objective),
+                    "gain": gain.value,
+                    "gain_low": gain.low,
+                    "gain_high": gain.high,
                     "Z": evaluation.objective,
                     "Z_low": evaluation.ci[0],
                     "Z_high": evaluation.ci[1],
                     "Z_without_barriers": nothing,
-                    "targets_missed_by": own.missed[s],
+                    "targets_missed_by": own.missed[OPTIMUM][s],
                 }
             )
     return rows
+
+
+def section_gain(plan: CorridorPlan, own: BudgetPlan, s: int) -> Mean:
+    """Return the gain of a section with its 95 % interval [EUR/year], 0 without barriers."""
+    evaluation, nothing = own.evaluation.sections[s], plan.problem.problems[s].nothing
+    if not evaluation.layout:
+        return Mean(0.0, 0.0, 0.0)
+    length = plan.problem.corridor.sections[s].length
+    before = Mean(nothing.objective, *nothing.ci).times(length)
+    after = Mean(evaluation.objective, *evaluation.ci).times(length)
+    return Mean(before.value - after.value, *difference(before, after))
 
 
 def front_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
@@ -128,7 +185,7 @@ def front_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
             rows.append(
                 {
                     "section": section.name,
-                    "layout": words(option.layout),
+                    "layout": words(option.layout, section.site),
                     "cost": option.cost,
                     "Z": value.value,
                     "Z_low": value.low,
@@ -146,13 +203,14 @@ def priority_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
     for own in plan.plans[:-1]:
         for place, step in enumerate(own.following):
             options = plan.fronts[step.section]
+            section = plan.problem.corridor.sections[step.section]
             rows.append(
                 {
                     "budget": own.budget,
                     "priority": place + 1,
-                    "section": plan.problem.corridor.sections[step.section].name,
-                    "instead_of": words(options[step.before].layout),
-                    "build": words(options[step.after].layout),
+                    "section": section.name,
+                    "instead_of": words(options[step.before].layout, section.site),
+                    "build": words(options[step.after].layout, section.site),
                     "additional_cost": step.cost,
                     "waiting_costs_per_year": step.saving,
                     "saving_per_euro": step.saving / step.cost,
@@ -161,28 +219,39 @@ def priority_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
     return rows
 
 
-def words(layout: rigdda.Layout) -> str:
-    """Return a layout as text."""
-    return "; ".join(barrier.label for barrier in layout) or "nothing"
+def words(layout: rigdda.Layout, site: rigdda.Site) -> str:
+    """Return a layout as text: kinds, sizes and chainages as `rigdda design` prints them."""
+    return "; ".join(_placed(barrier, site) for barrier in layout) or "nothing"
+
+
+def _placed(barrier: rigdda.Barrier, site: rigdda.Site) -> str:
+    """Return kind, sizes and chainage of a barrier as text."""
+    if not isinstance(barrier, Built):  # its label says where it is
+        return barrier.label
+    sizes, _ = barrier.order(site.road.start)
+    return ", ".join(filter(None, (barrier.label, sizes, f"at x = {barrier.x:.1f} m")))
 
 
 def table_of_budgets(plan: CorridorPlan) -> Table:
-    """Return the table of all budgets, in thousand EUR and thousand EUR per year."""
+    """Return the table of all budgets, in thousand EUR and thousand EUR per year.
+
+    A dash is a value that is not defined, see `budget_rows`.
+    """
     out = empty_table(
         ("budget", "spent", "gain (95 %)", "share", "same", "worst", "ratio", "1 EUR")
     )
     for budget_plan in plan.plans:
         limit = "unlimited" if budget_plan is plan.unlimited else thousands(budget_plan.budget)
         best = budget_plan.evaluation
-        simple = [percent(share(plan, e.gain)) for e in budget_plan.methods.values()]
+        parts = [share(plan, e.gain) for e in (best, *budget_plan.methods.values())]
+        price = budget_plan.shadow_price
         low, high = best.gain_ci
         out.add_row(
             limit,
             thousands(best.cost),
             f"{thousands(best.gain)} ({thousands(low, 'down')} to {thousands(high, 'up')})",
-            percent(share(plan, best.gain)),
-            *simple,
-            f"{budget_plan.shadow_price:.2g}",
+            *("-" if part is None else percent(part) for part in parts),
+            "-" if price is None else f"{price:.2g}",
         )
     return out
 
@@ -192,14 +261,13 @@ def table_of_sections(plan: CorridorPlan, own: BudgetPlan) -> Table:
     out = empty_table(("section", "m", "cost", "gain", "risk left", "next", "layout"))
     following = {step.section: place + 1 for place, step in enumerate(own.following)}
     for s, evaluation in enumerate(own.evaluation.sections):
-        section, nothing = plan.problem.corridor.sections[s], plan.problem.problems[s].nothing
-        gain = section.length * (nothing.objective - evaluation.objective)
+        section, gain = plan.problem.corridor.sections[s], section_gain(plan, own, s).value
         risk = section.length * (evaluation.harm + evaluation.repair)
         place = f"{following[s]}." if s in following else ""
         out.add_row(
             section.name, f"{section.length:g}", thousands(section.length * evaluation.cost),
-            thousands(gain) if evaluation.layout else "0", thousands(risk), place,
-            words(evaluation.layout),
+            thousands(gain), thousands(risk), place,
+            words(evaluation.layout, section.site),
         )  # fmt: skip
     return out
 
@@ -210,19 +278,44 @@ def thousands(value: float, rounding: Rounding = "nearest") -> str:
 
 
 def shown_budget(plan: CorridorPlan) -> BudgetPlan:
-    """Return the plan for the largest budget that limits what is built, or else the largest."""
-    limited = [own for own in plan.plans[:-1] if own.shadow_price > 0.0]
+    """Return the plan for one budget, of which all sections are printed.
+
+    It is the largest budget that builds something and leaves a step undone that would pay. If there
+    is none, it is the largest budget.
+    """
+    limited = [own for own in plan.plans[:-1] if own.evaluation.cost > 0.0 and own.following]
     return (limited or plan.plans[:-1])[-1]
 
 
 def sections_that_miss(plan: CorridorPlan, own: BudgetPlan) -> list[str]:
     """Return the names of the sections that may miss a target with a plan."""
     names = [section.name for section in plan.problem.corridor.sections]
-    return [name for name, missed in zip(names, own.missed, strict=True) if missed > 0.0]
+    return [name for name, by in zip(names, own.missed[OPTIMUM], strict=True) if by > 0.0]
+
+
+def has_targets(plan: CorridorPlan) -> bool:
+    """Return whether a section has a target."""
+    sections = plan.problem.corridor.sections
+    return any(value is not None for s in sections for value in s.targets.values())
+
+
+def not_shown_to_save(plan: CorridorPlan, own: BudgetPlan) -> list[str]:
+    """Return the sections whose barriers may cost more than they save, with their gains as text.
+
+    Their 95 % interval of the gain, from releases that did not affect any choice, is not entirely
+    positive.
+    """
+    found = []
+    for s, section in enumerate(plan.problem.corridor.sections):
+        gain = section_gain(plan, own, s)
+        if own.evaluation.sections[s].layout and gain.low <= 0.0:
+            ends = f"{euros(gain.low, 'down')} to {euros(gain.high, 'up')}"
+            found.append(f"{section.name} ({euros(gain.value)} EUR per year, {ends})")
+    return found
 
 
 STYLES = {OPTIMUM: ("#1c5aa0", "o"), "same money per metre": ("#d0312d", "s"),
-          "worst section first": ("#b8860b", "^"), "saving per cost": ("#009e73", "D")}  # fmt: skip
+          "worst section first": ("#b8860b", "^"), RATIO: ("#009e73", "D")}  # fmt: skip
 """Colour and marker of each method."""
 
 
@@ -242,8 +335,9 @@ def draw_gain(path: Path, plan: CorridorPlan) -> None:
             if name == OPTIMUM:
                 low, high = np.array([e.gain_ci for e in evaluations]).T / 1e3
                 axes.fill_between(budgets / 1e3, low, high, color=colour, alpha=0.15, linewidth=0)
+            label = f"{name} (ignores targets)" if has_targets(plan) and name == RATIO else name
             axes.plot(budgets / 1e3, gain, color=colour, marker=marker, markersize=5,
-                      linewidth=2.0 if name == OPTIMUM else 1.2, label=name)  # fmt: skip
+                      linewidth=2.0 if name == OPTIMUM else 1.2, label=label)  # fmt: skip
         whole = plan.unlimited.evaluation
         axes.axhline(whole.gain / 1e3, color="0.4", linestyle="--", linewidth=1.0)
         axes.annotate(f"unlimited money ({thousands(whole.cost)} thousand EUR)",

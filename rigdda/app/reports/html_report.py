@@ -339,11 +339,15 @@ def limits_section(_: Folders) -> Iterator[Block]:
 
 def repeat_section(folders: Folders) -> Iterator[Block]:
     """Yield commands, seeds and versions, with which the results can be repeated."""
-    yield Paragraph(
-        "On one machine, the same version gives the same numbers bit for bit. The results folders "
-        "hold the site as it was used and all options in run.json."
-    )
     records = [(folder, record) for folder in folders for record in folder.records.values()]
+    kept = "The file run.json of a results folder has all options"
+    kept += " and the site as it was used." if any(r.site for _, r in records) else "."
+    if any(r.command == "corridor" for _, r in records):
+        kept += (
+            " For a corridor, the folder corridor-as-used has the corridor and its sites as they "
+            "were used."
+        )
+    yield Paragraph(f"On one machine, the same version gives the same numbers bit for bit. {kept}")
     commands = [shlex.join(["rigdda", *record.arguments]) for _, record in records]
     yield Listing("\n".join(commands))
     head = ("results", "command", "began (UTC)", "ended (UTC)", "seed", "rigdda")

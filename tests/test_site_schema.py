@@ -45,7 +45,7 @@ def refused(folder, name: str, old: str, new: str) -> BadInput:
 def test_the_file_of_a_corridor_is_told_from_that_of_a_site(tmp_path):
     file = tmp_path / "road.toml"
     file.write_text('budget = 1e5\n[[sections]]\nsite = "verge"\nlength = 100.0\n')
-    with pytest.raises(BadInput, match="road.toml'?: this is the file of a corridor: use `rigdda"):
+    with pytest.raises(BadInput, match="this is the file of a corridor: use `rigdda corridor`"):
         Site.load(file)
 
 

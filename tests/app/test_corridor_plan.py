@@ -17,11 +17,12 @@ from processes import png_size, refused, rig, rows, run
 from test_report import Page
 
 import rigdda
-from rigdda import BadInput, Corridor, CorridorSection, Ditch, Site, load_layout
+from rigdda import BadInput, Corridor, CorridorSection, Ditch, Fence, Site, load_layout
 from rigdda.agents.corridor import allocation, planning, programme
 from rigdda.agents.corridor.allocation import Estimates
 from rigdda.agents.corridor.programme import SIMPLE_METHODS, Options
-from rigdda.envs import CorridorProblem
+from rigdda.envs import CorridorProblem, DesignProblem
+from rigdda.envs.intervals import upper_bound
 from rigdda.model import corridor as corridors
 
 EXAMPLE = Path(rigdda.__file__).parents[1] / "examples/corridor/pass-road.toml"
@@ -291,11 +292,11 @@ budget = [0, 12_000, 2_000_000]
 site = "own.toml"
 length = 60.0
 name = "km 1.2"
-reach = 0.05
+reach = 0.002
 [[sections]]
 site = "quick"
 length = 140.0
-reach = 0.05
+reach = 0.002
 """
 
 
@@ -568,3 +569,23 @@ def test_unknown_corridors_and_options(tmp_path: Path) -> None:
     assert "--budget" in refused("corridor", "corridor-12", "--budget", -1, folder=tmp_path)
     assert "--releases" in refused("corridor", "corridor-12", "--releases", 5, folder=tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missed_target_is_judged_by_all_releases() -> None:
+    """With 20 releases, upper bounds are above a target that 200 more show to be met."""
+    problem = DesignProblem("verge", targets={"reach": 0.5})
+    layout = (Fence(problem.zone.start + 2.0, 4.0, energy_class=500),)
+    few, many = (problem.evaluate(layout, seeds=range(*ends)) for ends in ((0, 20), (20, 220)))
+    option = planning.Option(layout, 0.0, 0.0, [few])
+    alone = option.missed(problem)
+    option.report = many
+    events = [event.name for event in problem.site.events if event.design]
+    bounds = [
+        upper_bound(
+            few.reach[name].count + many.reach[name].count,
+            few.reach[name].releases + many.reach[name].releases,
+        )
+        for name in events
+    ]
+    assert option.missed(problem) == pytest.approx(max(0.0, max(bounds) - 0.5))
+    assert option.missed(problem) < alone

@@ -21,6 +21,7 @@ from rigdda import BadInput, Corridor, CorridorSection, Ditch, Fence, Site, load
 from rigdda.agents.corridor import allocation, planning, programme
 from rigdda.agents.corridor.allocation import Estimates
 from rigdda.agents.corridor.programme import SIMPLE_METHODS, Options
+from rigdda.app.reports import corridor_report
 from rigdda.envs import CorridorProblem, DesignProblem
 from rigdda.envs.intervals import upper_bound
 from rigdda.model import corridor as corridors
@@ -589,3 +590,21 @@ def test_a_missed_target_is_judged_by_all_releases() -> None:
     ]
     assert option.missed(problem) == pytest.approx(max(0.0, max(bounds) - 0.5))
     assert option.missed(problem) < alone
+
+
+def test_the_numbers_of_targets_are_written() -> None:
+    problem = DesignProblem("verge")
+    layout = (Fence(problem.zone.start + 2.0, 4.0, energy_class=500),)
+    found = problem.evaluate(layout, seeds=range(60))
+    columns = corridor_report.risk_columns(found, problem.site)
+    events = [event.name for event in problem.site.events if event.design]
+    assert columns["reach_high"] == max(found.reach[name].bound for name in events)
+    assert columns["failure_high"] == max(found.failure[name].bound for name in events)
+    assert columns["reach"] in [found.reach[name].probability for name in events]
+    assert columns["individual"] is None  # the site has no traffic
+    assert corridor_report.risk_columns(problem.nothing, problem.site)["failure_high"] is None
+    busy = DesignProblem("slab-cut")
+    risk = busy.nothing.risk
+    assert risk is not None
+    columns = corridor_report.risk_columns(busy.nothing, busy.site)
+    assert (columns["individual"], columns["individual_high"]) == risk.individual[::2]

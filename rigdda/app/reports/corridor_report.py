@@ -12,11 +12,13 @@ import numpy as np
 import rigdda
 from rigdda.agents.corridor.planning import OPTIMUM, BudgetPlan, CorridorPlan
 from rigdda.agents.corridor.programme import RATIO
+from rigdda.agents.designers.frontier import worst
 from rigdda.app.reports.pictures import DPI, EVENTS, FONT, save
 from rigdda.app.reports.tables import empty_table, write_rows
 from rigdda.app.reports.wording import euros, percent
 from rigdda.barriers import KINDS, Built
 from rigdda.display import ROAD
+from rigdda.envs import Evaluation
 from rigdda.envs.corridor_problem import difference
 from rigdda.envs.intervals import Mean
 from rigdda.rounding import Rounding
@@ -159,10 +161,32 @@ def section_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
                     "Z_low": evaluation.ci[0],
                     "Z_high": evaluation.ci[1],
                     "Z_without_barriers": nothing,
+                    **risk_columns(evaluation, section.site),
                     "targets_missed_by": own.missed[OPTIMUM][s],
                 }
             )
     return rows
+
+
+def risk_columns(evaluation: Evaluation, site: rigdda.Site) -> dict[str, float | None]:
+    """Return the numbers to which targets refer, with upper ends of their intervals.
+
+    They are the probabilities that rock of a design event reaches the road and that a barrier fails
+    in it, for the design event with the largest one-sided 95 % upper bound, and the individual risk
+    [1/year]. A number is None without design events, barriers or traffic.
+    """
+    out: dict[str, float | None] = {}
+    for name, seen in (("reach", evaluation.reach), ("failure", evaluation.failure)):
+        chances = [seen[event.name] for event in site.events if event.design]
+        if name == "failure" and not evaluation.layout:
+            chances = []
+        greatest = worst(chances) if chances else None
+        out[name] = greatest.probability if greatest and greatest.releases else None
+        out[f"{name}_high"] = greatest.bound if greatest else None
+    individual = evaluation.risk.individual if evaluation.risk is not None else None
+    out["individual"] = individual.value if individual is not None else None
+    out["individual_high"] = individual.high if individual is not None else None
+    return out
 
 
 def section_gain(plan: CorridorPlan, own: BudgetPlan, s: int) -> Mean:

@@ -402,6 +402,7 @@ EXHIBITS = (
             interval("gain", "gain", euros),
             interval("Z", "Z", euros),
             money("Z without", "Z_without_barriers"),
+            value("P(reach)", "reach", percent),
         ),
     ),
     Exhibit("corridor", "priorities.csv", "What should be built next"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -354,7 +355,7 @@ class _Draft:
 
     def _sources(self) -> list[tuple[str, Span, str]]:
         """Return the name of each source, its band and the origin of the band."""
-        found, origin = [], self.profile.origin
+        found, origin, reach = [], self.profile.origin, _reach()
         for text in self.request.sources:
             name, span = _ranged("--source", text, origin)
             if span is None:
@@ -363,6 +364,13 @@ class _Draft:
             if not self.x[0] <= span[0] < span[1] < self.road[0]:
                 low, high = sorted(map(origin.chainage_of, (float(self.x[0]), self.road[0])))
                 hint = f"put it uphill of the road, between chainage {low:.10g} and {high:.10g}"
+                raise BadInput("--source", text, hint)
+            first, last = float(self.x[0]) + reach, self.road[0] - reach
+            if first < last and not first <= span[0] < span[1] < last:
+                low, high = sorted(map(origin.chainage_of, (first, last)))
+                low, high = math.ceil(100.0 * low) / 100.0, math.floor(100.0 * high) / 100.0
+                hint = f"keep it between chainage {low:.10g} and {high:.10g}, so that its blocks "
+                hint += "lie on the profile and clear the road"
                 raise BadInput("--source", text, hint)
             found.append((name, span, GIVEN))
         return found if found or self.masses else [("face", self._face(), PLACEHOLDER)]

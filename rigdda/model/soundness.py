@@ -203,7 +203,7 @@ def _check_source(site: SiteTables, source: Source) -> None:
                 raise _too_large(site, source, room)
             hint = (
                 f"keep it between {chainage(first)} and {chainage(last)}, so that its blocks "
-                "clear the road"
+                "lie on the ground and clear the road"
             )
             raise BadInput(f"{source.words}.band", source.band, hint)
     for where, piece in source.pieces():

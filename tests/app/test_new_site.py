@@ -360,6 +360,10 @@ OPTIONS = {
     "source without range": ((*ASKED, "--source", "cliff"), "cliff:2-8"),
     "source on the road": ((*ASKED, "--source", "cliff:100-115"), "uphill of the road"),
     "source beyond": ((*ASKED, "--source", "cliff:-50--40"), "uphill of the road"),
+    "source at the end of the profile": (
+        (*ASKED, "--source", "cliff:0.2-8"),
+        "--source = 'cliff:0.2-8': keep it between chainage 1 and 111, so that its blocks lie on",
+    ),
     "source everywhere": (
         (*ASKED, "--source", "cliff:1-110.9", "--zone", 20, 111), "cover the whole zone",
     ),

@@ -136,7 +136,7 @@ the released mass."""
 
 FAST_DT = 2.5e-2
 """Time step at fidelity "fast", unless that of the site is longer [s]. With 12.5 ms, releases of
-single blocks and groups take as long as at full fidelity, and the bias of Z is the same."""
+single blocks and groups take almost as long as at full fidelity."""
 
 
 def site_at_fidelity(site: Site, fidelity: str) -> Site:

@@ -32,7 +32,7 @@ from rigdda.errors import BadInput
 from rigdda.fields import about, documented
 from rigdda.files import atomic, is_file, read
 from rigdda.ground.prices import Consequences, Prices
-from rigdda.model.site import Site
+from rigdda.model.site import CORRIDOR_KEYS, Site
 from rigdda.model.traffic import Traffic
 
 MOST_SECTIONS = 10_000
@@ -299,7 +299,7 @@ def is_corridor(path: str | os.PathLike[str]) -> bool:
     if file.suffix != ".toml" or not is_file(file):
         return False
     data = fields.parse("corridor", str(path), read("corridor", file))
-    return "sections" in data or "table" in data
+    return not data.keys().isdisjoint(CORRIDOR_KEYS)
 
 
 def site_files(source: str | os.PathLike[str]) -> tuple[Path, ...]:

@@ -59,6 +59,10 @@ STEEPEST_DEG = 85.0
 """Upper limit of friction angles after random variation [deg]."""
 
 
+CORRIDOR_KEYS = ("sections", "table")
+"""Keys of the file of a corridor, one of which it needs and which a site does not have."""
+
+
 class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Description of a site: the tables of its file, checked for consistency.
 
@@ -120,7 +124,7 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
             If a surface has neither a ground nor a coefficient of rolling resistance.
         """
         tables = fields.parse("site file", name, text)
-        if {"sections", "table", "budget"} & set(tables) and "slope" not in tables:
+        if not tables.keys().isdisjoint(CORRIDOR_KEYS):
             raise BadInput("site", name, "this is the file of a corridor: use `rigdda corridor`")
         found = fields.checked(cls, tables)
         found["surfaces"] = _with_rolling(found["surfaces"], tables["surfaces"])

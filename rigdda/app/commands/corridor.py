@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -21,6 +22,9 @@ from rigdda.app.terminal import (
     seed_option,
     show,
 )
+
+if TYPE_CHECKING:
+    from rigdda.agents.corridor.planning import CorridorPlan
 
 
 @click.command(short_help="Plan the barriers of many slopes within one budget.")
@@ -80,6 +84,21 @@ def corridor(
         report.keep_corridor(where, folder)
         plan = Planner(problem, releases, seed, robust, stored, tick).plan()
         report.write(plan, folder)
+    show_plan(plan)
+    for path in files:
+        if left := site_check.placeholders(str(path)):
+            note(f"the site file {path} marks {len(left)} values as placeholders to replace")
+    click.echo(
+        f"{len(where.sections)} sections, {where.length:,.0f} m, {plan.releases:,} releases; "
+        f"{', '.join(report.CORRIDOR_FILES)}, layouts "
+        f"and {report.CORRIDOR_COPY} are in {folder}"
+    )
+
+
+def show_plan(plan: CorridorPlan) -> None:
+    """Print what each budget achieves, what one of them builds, and the findings."""
+    from rigdda.app.reports import corridor_report as report
+
     click.echo(
         "Costs are in thousand EUR, savings in thousand EUR per year. share: saving as a share\n"
         "of the saving with unlimited money; same, worst and ratio: this share with equal money\n"
@@ -91,7 +110,7 @@ def corridor(
             "Money is spent on targets first, even where this saves nothing; the method of the "
             "greatest saving per cost (ratio) and the saving of one more EUR ignore targets."
         )
-    if where.yearly_budget is not None:
+    if plan.problem.corridor.yearly_budget is not None:
         finding(
             "All methods keep the yearly budget, also with unlimited money. What one more EUR "
             "would save is not computed with a yearly budget."
@@ -115,11 +134,3 @@ def corridor(
             if one is plan.unlimited:
                 money = "even with unlimited money"
             finding(f"{money}, these sections may miss a target: {', '.join(missing)}")
-    for path in files:
-        if left := site_check.placeholders(str(path)):
-            note(f"the site file {path} marks {len(left)} values as placeholders to replace")
-    click.echo(
-        f"{len(where.sections)} sections, {where.length:,.0f} m, {plan.releases:,} releases; "
-        f"{', '.join(report.CORRIDOR_FILES)}, layouts "
-        f"and {report.CORRIDOR_COPY} are in {folder}"
-    )

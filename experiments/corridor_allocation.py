@@ -67,9 +67,8 @@ class Population:
         for s, options in enumerate(planner.fronts):
             problem = self.problem.problems[s]
             for option in options[1:]:
-                found = self.pools[s].outcomes(option.layout)
-                option.batches.append(problem.judge(option.layout, found))
-            options[0].batches.append(problem.nothing)
+                option.add(problem, self.pools[s].outcomes(option.layout))
+            options[0].known = problem.nothing
         return planner.options()
 
     def share(self, estimated: Options) -> float:
@@ -109,9 +108,8 @@ class Replay(Planner):
         own, problem = self._population.pools[s], self.problem.problems[s]
         outcomes = own.outcomes(option.layout)
         seen = dict.fromkeys(problem.site.event_names, 0)
-        for batch in option.batches:
-            for event, estimate in batch.reach.items():
-                seen[event] += estimate.releases
+        if option.known is not None:
+            seen = {event: chance.releases for event, chance in option.known.reach.items()}
         found = []
         for event in problem.plan(range(count)):
             found.append(outcomes[self._draw(s, event, seen[event], own, option.layout)])

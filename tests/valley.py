@@ -47,8 +47,8 @@ class Valley(DesignProblem):
         names = self.site.event_names
         free = Sample([self.outcome((), s, n) for n in names for s in range(10**9, 10**9 + 2000)])
         facts = ensemble._facts(self.site, free)
-        nothing = judge(self.site, (), free, {}, {})
         shares = ensemble._shares(self.site, facts)
+        nothing = judge(self.site, (), free, facts, shares)
         return ensemble.Ensemble(replace(nothing, outcomes=()), facts, shares)
 
     def catch(self, barrier: Barrier) -> float:
@@ -71,12 +71,7 @@ class Valley(DesignProblem):
         volume = 1.0 if reached else 0.0
         return replace(TEMPLATE, event=event, road_volume=volume, reached=reached, barriers=())
 
-    def sample(
-        self,
-        layout: Sequence[Barrier],
-        seeds: Mapping[str, Sequence[int]],
-        executor: Executor | None = None,
-    ) -> Sample:
+    def sample(self, layout: Sequence[Barrier], seeds: Mapping[str, Sequence[int]]) -> Sample:
         standing = self.check(layout)
         return Sample([self.outcome(standing, s, e) for e, own in seeds.items() for s in own])
 

@@ -274,7 +274,7 @@ class ArchivedProblem(DesignProblem):
             site, kept.max_barriers, kept.kinds, targets, zone=kept.zone, max_cost=max_cost
         )
         facts = statistics(site, kept.bare, kept.blocks)
-        nothing = replace(judge(site, (), kept.bare, {}, {}), outcomes=())
+        nothing = replace(judge(site, (), kept.bare, facts, kept.shares), outcomes=())
         object.__setattr__(self, "_ensemble", Ensemble(nothing, facts, kept.shares))
 
     @property

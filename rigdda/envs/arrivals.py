@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from typing import NamedTuple
 
 import msgspec
@@ -54,15 +53,13 @@ class ReleaseRate(NamedTuple):
     releases: float
 
 
-def release_rates(site: Site, executor: Executor | None = None) -> list[ReleaseRate]:
+def release_rates(site: Site) -> list[ReleaseRate]:
     """Return the rates of the releases of all events whose rate is that of arrivals.
 
     Parameters
     ----------
     site : Site
         The site, with its existing barriers.
-    executor : Executor, optional
-        Where to run the simulations; by default in threads on all cores.
 
     Raises
     ------
@@ -72,7 +69,7 @@ def release_rates(site: Site, executor: Executor | None = None) -> list[ReleaseR
         If a simulation diverges.
     """
     where = as_site(site)
-    return [_converted(where, e, executor) for e in where.events if e.rate_of == ARRIVAL]
+    return [_converted(where, e) for e in where.events if e.rate_of == ARRIVAL]
 
 
 def with_release_rates(site: Site, rates: Sequence[ReleaseRate] | None = None) -> Site:
@@ -102,9 +99,9 @@ def with_release_rates(site: Site, rates: Sequence[ReleaseRate] | None = None) -
     return msgspec.structs.replace(where, events=events) if own else where
 
 
-def _converted(site: Site, event: Event, executor: Executor | None) -> ReleaseRate:
+def _converted(site: Site, event: Event) -> ReleaseRate:
     """Return the rate of the releases of an event whose rate is that of arrivals."""
-    chance = _chance(site, event.name, executor)
+    chance = _chance(site, event.name)
     if chance.count == 0:
         hint = (
             f"give the rate of releases: rock of this event reaches the road in none of "
@@ -122,11 +119,11 @@ def _converted(site: Site, event: Event, executor: Executor | None) -> ReleaseRa
     return ReleaseRate(event.name, event.rate, chance, rate)
 
 
-def _chance(site: Site, event: str, executor: Executor | None) -> Estimate:
+def _chance(site: Site, event: str) -> Estimate:
     """Return the probability that rock of an event reaches the road without new barriers."""
     count = LEAST_RELEASES
     while True:
-        outcomes = bare_outcomes(site, {event: count}, executor)[event]
+        outcomes = bare_outcomes(site, {event: count})[event]
         chance = estimate(sum(outcome.reached for outcome in outcomes), count)
         p = chance.probability
         if count >= MOST_RELEASES or (p > 0.0 and math.sqrt((1.0 - p) / (p * count)) <= ENOUGH):

@@ -16,7 +16,7 @@ from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Scene, Site, 
 from rigdda.barriers import section
 from rigdda.barriers.base import ELEMENT, surfaces_below
 from rigdda.barriers.gravity_wall import SLID
-from rigdda.envs.fence_checks import Action, Demand, FenceCheck
+from rigdda.envs.fence_checks import USE_ROUNDING, Action, Demand, FenceCheck
 from rigdda.envs.ritchie_ditch import RitchieDitch
 from rigdda.limit_equilibrium import Impact
 
@@ -75,7 +75,7 @@ class BarrierCheck(NamedTuple):
     @property
     def satisfied(self) -> bool:
         """Whether the utilisation is acceptable."""
-        return self.use <= self.limit + 1e-9
+        return self.use <= self.limit + USE_ROUNDING
 
 
 def checks_of(site: Site, barrier: Barrier, demand: Demand | None) -> Iterator[BarrierCheck]:

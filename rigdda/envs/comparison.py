@@ -2,14 +2,15 @@
 
 Most releases cost the same with both layouts. The extra cost of the first layout and its savings
 are therefore treated as two separate means of rarely incurred costs, each with its own interval
-(see `rigdda.envs.intervals`).
+(see `rigdda.envs.intervals`). A release cannot have both, so that their covariance over n releases
+is minus the product of their means, and the variance of the mean difference is the sum of the two
+variances plus 2 E[extra] E[saving] / n.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigdda import BadInput, Barrier, Layout, Outcome, Site
 from rigdda.envs import ensemble
 from rigdda.envs.cost import Account, Facts, account
-from rigdda.envs.intervals import Known, Mean, cost
+from rigdda.envs.intervals import Known, Mean, cost, quantile
 from rigdda.envs.problem import DesignProblem
 
 LEAST_PER_EVENT = 2
@@ -51,19 +52,18 @@ def compare(
     one: Sequence[Barrier] | ArrayLike,
     two: Sequence[Barrier] | ArrayLike,
     seeds: Sequence[int],
-    executor: Executor | None = None,
 ) -> Difference:
     """Return the difference in Z between two layouts on the same releases.
 
-    The layouts, seeds and executor are those of `DesignProblem.evaluate`. At least two seeds per
-    event are needed.
+    The layouts and seeds are those of `DesignProblem.evaluate`. At least two seeds per event are
+    needed.
 
     Raises
     ------
     BadInput, Diverged
         As `DesignProblem.evaluate` does.
     """
-    a, b = (problem.evaluate(layout, seeds, executor) for layout in (one, two))
+    a, b = (problem.evaluate(layout, seeds) for layout in (one, two))
     facts = ensemble.of(problem.site, problem.key).facts
     return difference(problem.site, (a.layout, b.layout), (a.outcomes, b.outcomes), facts)
 
@@ -132,8 +132,9 @@ def difference_of_accounts(
         harm = facts[name].harm
         known = Known(max(rates) * harm.mean, harm.variation)
         up, down = (cost(np.maximum(part, 0.0), part > 0.0, known) for part in (more, -more))
-        below += _below(up) ** 2 + _above(down) ** 2
-        above += _above(up) ** 2 + _below(down) ** 2
+        both = 2.0 * up.value * down.value * quantile(len(more) - 1) ** 2 / len(more)
+        below += _below(up) ** 2 + _above(down) ** 2 + both
+        above += _above(up) ** 2 + _below(down) ** 2 + both
     ends = value - math.sqrt(below), value + math.sqrt(above)
     return Difference(value, ends, len(one.event), differ)
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -147,10 +146,7 @@ class CorridorProblem:
         return tuple(found)
 
     def evaluate(
-        self,
-        layouts: Sequence[Sequence[Barrier]],
-        seeds: Sequence[int],
-        executor: Executor | None = None,
+        self, layouts: Sequence[Sequence[Barrier]], seeds: Sequence[int]
     ) -> CorridorEvaluation:
         """Evaluate one layout for each section by simulating one release per seed in each.
 
@@ -160,8 +156,6 @@ class CorridorProblem:
             A feasible layout for each section.
         seeds : sequence of int
             Distinct seeds of the releases.
-        executor : Executor, optional
-            Where to run the simulations; by default in threads on all cores.
 
         Raises
         ------
@@ -172,7 +166,7 @@ class CorridorProblem:
         """
         checked = self.check(layouts)
         found = [
-            problem.evaluate(layout, seeds, executor)
+            problem.evaluate(layout, seeds)
             for problem, layout in zip(self.problems, checked, strict=True)
         ]
         return self.judge(found)
@@ -180,16 +174,14 @@ class CorridorProblem:
     def judge(self, evaluations: Sequence[Evaluation]) -> CorridorEvaluation:
         """Return the evaluation of the corridor from those of its sections.
 
-        Sections without barriers do not contribute to the gain or to its interval.
+        Sections without barriers do not contribute to the gain or to its interval. The errors of
+        sections of the same site on the same releases are added, the others are independent.
         """
         lengths = self.lengths.tolist()
         rows = list(zip(lengths, self.problems, evaluations, strict=True))
-        whole = total(Mean(e.objective, *e.ci).times(length) for length, _, e in rows)
         built = [row for row in rows if row[2].layout]
-        after = total(Mean(e.objective, *e.ci).times(length) for length, _, e in built)
-        before = total(
-            Mean(p.nothing.objective, *p.nothing.ci).times(length) for length, p, _ in built
-        )
+        whole, after = _total(rows), _total(built)
+        before = _total([(length, p, p.nothing) for length, p, _ in built])
         return CorridorEvaluation(
             sections=tuple(evaluations),
             objective=whole.value,
@@ -206,11 +198,26 @@ class CorridorProblem:
         Sections with the same layout contribute neither to the difference [EUR/year] nor to its
         95 % interval.
         """
-        rows = list(zip(self.lengths.tolist(), one.sections, other.sections, strict=True))
-        rows = [row for row in rows if row[1].layout != row[2].layout]
-        less = total(Mean(e.objective, *e.ci).times(length) for length, e, _ in rows)
-        more = total(Mean(e.objective, *e.ci).times(length) for length, _, e in rows)
+        pairs = zip(one.sections, other.sections, strict=True)
+        rows = [
+            (length, problem, e, f)
+            for length, problem, (e, f) in zip(
+                self.lengths.tolist(), self.problems, pairs, strict=True
+            )
+            if e.layout != f.layout
+        ]
+        less = _total([(length, problem, e) for length, problem, e, _ in rows])
+        more = _total([(length, problem, f) for length, problem, _, f in rows])
         return Mean(more.value - less.value, *difference(more, less))
+
+
+def _total(rows: Sequence[tuple[float, DesignProblem, Evaluation]]) -> Mean:
+    """Return the sum of length times Z over sections [EUR/year]."""
+    groups: dict[tuple[bytes, tuple[int, ...]], list[Mean]] = {}
+    for length, problem, e in rows:
+        own = groups.setdefault((problem.key, e.seeds), [])
+        own.append(Mean(e.objective, *e.ci).times(length))
+    return total(Mean(*map(math.fsum, zip(*own, strict=True))) for own in groups.values())
 
 
 def difference(one: Mean, other: Mean) -> Interval:

@@ -11,14 +11,14 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Layout, Outcome, Site, display
 from rigdda.barriers import describe
-from rigdda.barriers.fence import PANEL
 from rigdda.envs.intervals import Estimate, Interval, Known, Mean, cost, estimate, pair, total
 from rigdda.model.traffic import Traffic
 from rigdda.rounding import between
@@ -101,7 +101,7 @@ class Evaluation:
         Number of releases, and how many of them were simulated for this evaluation; the others came
         from the outcome cache. `simulated` is ignored in comparisons.
     seconds : float
-        Processor time of the simulations [s]; ignored in comparisons.
+        Processor time of the simulations [s], NaN in an executor; ignored in comparisons.
     risk : Risk or None
         Risk to the traffic; None if the site has no `[traffic]`.
     """
@@ -209,11 +209,13 @@ class Facts:
     harm, volume : Known
         Harm [EUR] and volume [m3] given that a block reached the road. If none did, they are
         computed as if all released rock had reached it.
-    blocks : float
-        Mean number of blocks per release.
+    blocks, width : float
+        Mean number of blocks per release, and mean width of a release [m].
     toll : tuple of Known
         Vehicles hit, vehicles that run into debris and fatalities given that any are, computed as
         harm is; empty if the site has no `[traffic]`.
+    tolled : tuple of int
+        Number of releases with each of them.
     """
 
     releases: int
@@ -221,7 +223,14 @@ class Facts:
     harm: Known
     volume: Known
     blocks: float
+    width: float
     toll: tuple[Known, ...] = ()
+    tolled: tuple[int, ...] = ()
+
+    @property
+    def debris(self) -> float:
+        """Mean volume of rock on the road per release [m3]."""
+        return self.volume.mean * self.reached / self.releases
 
 
 Floats = NDArray[np.float64]
@@ -254,6 +263,23 @@ class Account:
             self.reached[which],
             self.failed[which],
             None if self.toll is None else self.toll[which],
+        )
+
+    @classmethod
+    def join(cls, parts: Sequence[Account]) -> Account:
+        """Return the account of the releases of several accounts, one after another."""
+
+        def column(name: str) -> Any:
+            return np.concatenate([getattr(part, name) for part in parts])
+
+        return cls(
+            column("event"),
+            column("harm"),
+            column("repair"),
+            column("volume"),
+            column("reached"),
+            column("failed"),
+            None if parts[0].toll is None else column("toll"),
         )
 
 
@@ -297,6 +323,7 @@ def learn(site: Site, own: Account, released: Floats, widths: Floats, blocks: fl
     """
     harm, volume = own.harm[own.reached], own.volume[own.reached]
     toll = None if own.toll is None else own.toll[own.reached]
+    tolled = () if toll is None else tuple((toll > 0.0).sum(axis=0).tolist())
     if not len(harm):
         volume = released
         harm = np.array([site.consequences.harm(v, True) for v in volume.tolist()])
@@ -308,7 +335,8 @@ def learn(site: Site, own: Account, released: Floats, widths: Floats, blocks: fl
             harm = harm + site.traffic.price(toll[:, 2])
     tolls = () if toll is None else tuple(map(_known_of, toll.T))
     count = len(own.harm), int(own.reached.sum())
-    return Facts(*count, Known.of(harm), Known.of(volume), blocks, tolls)
+    width = float(widths.mean())
+    return Facts(*count, Known.of(harm), Known.of(volume), blocks, width, tolls, tolled)
 
 
 def _known_of(values: Floats) -> Known:
@@ -317,8 +345,9 @@ def _known_of(values: Floats) -> Known:
 
 
 REPAIR_VARIATION = 0.2
-"""Coefficient of variation of the repair cost of a failed barrier [-]. It is small, because the
-widths of events seldom exceed by much the panel or element that is the least unit of repair."""
+"""Coefficient of variation of the repair cost of a failed barrier [-]. It is small, because a
+barrier is repaired over the width of the event, or over its least unit of repair if that is
+longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -351,7 +380,9 @@ def judge(
         Either at least two per event on average with every event present, or fewer, whose events
         were drawn with the probabilities `shares`.
     facts : mapping of str to Facts
-        Barrier-free statistics of each event; events without statistics may be left out.
+        Barrier-free statistics of each event. Those of some events may be left out if there are at
+        least two releases per event; intervals of rare harm are then too short, and `debris_share`
+        does not count these events.
     shares : mapping of str to float
         Probability of each event.
 
@@ -362,12 +393,33 @@ def judge(
     """
     if not len(outcomes):
         raise BadInput("outcomes", outcomes, "give at least one")
-    found, names = account(site, layout, outcomes), site.event_names
-    if len(outcomes) >= 2 * len(names):
+    judged = judge_account(site, layout, account(site, layout, outcomes), facts, shares)
+    return replace(judged, outcomes=tuple(outcomes))
+
+
+def judge_account(
+    site: Site,
+    layout: Layout,
+    found: Account,
+    facts: Mapping[str, Facts],
+    shares: Mapping[str, float],
+) -> Evaluation:
+    """Return the evaluation of a layout from the account of its releases; see `judge`.
+
+    It has no outcomes.
+
+    Raises
+    ------
+    BadInput
+        If there are no releases of an event with a non-zero rate.
+    """
+    names, count = site.event_names, len(found.event)
+    if count >= 2 * len(names):
         sums = stratified(site, layout, found, facts)
     else:
         sums = _weighted(site, layout, found, facts, shares)
     annual = site.annual(layout)
+    without = math.fsum(site.rate(name) * fact.debris for name, fact in facts.items())
     return Evaluation(
         layout=layout,
         seeds=(),
@@ -381,13 +433,13 @@ def judge(
         cost=site.capital(layout),
         debris=sums.volume.value,
         debris_ci=sums.volume.interval,
-        debris_share=1.0 if sums.volume.value else 0.0,
+        debris_share=sums.volume.value / without if without else 0.0,
         reach=_probabilities(names, found, found.reached),
         failure=_probabilities(names, found, found.failed),
         by_event=sums.by_event,
         targets=None,
-        outcomes=tuple(outcomes),
-        releases=len(outcomes),
+        outcomes=(),
+        releases=count,
         risk=Risk.of(site.traffic, sums.toll) if site.traffic is not None else None,
     )
 
@@ -402,7 +454,7 @@ def stratified(site: Site, layout: Layout, found: Account, facts: Mapping[str, F
     """
     parts: list[tuple[Mean, ...]] = []
     tolls: list[tuple[Mean, ...]] = []
-    largest_repair = _largest_repair(site, layout)
+    largest_repair = _largest_repairs(site, layout, facts)
     by_event: dict[str, float] = {}
     for name in site.event_names:
         rate, own = site.rate(name, layout), found.of(found.event == name)
@@ -412,7 +464,7 @@ def stratified(site: Site, layout: Layout, found: Account, facts: Mapping[str, F
         if not len(own.harm):
             raise BadInput("outcomes", f"none of {name}", "include releases of every event")
         known = facts.get(name)
-        parts.append(tuple(part.times(rate) for part in _means(own, known, largest_repair)))
+        parts.append(tuple(part.times(rate) for part in _means(own, known, largest_repair[name])))
         by_event[name] = parts[-1][2].value
         tolls.append(tuple(part.times(rate) for part in toll_means(own, known)))
     harm, repair, both, volume = (total(part[i] for part in parts) for i in range(4))
@@ -443,9 +495,10 @@ def _weighted(
         found.failed,
         None if found.toll is None else weight[:, None] * found.toll,
     )
-    mixed = _mixture(rate, facts, shares) if facts else None
+    mixed = _mixture(rate, facts, shares)
+    largest_repair = _largest_repairs(site, layout, facts)
     harm, repair, both, volume = _means(
-        drawn, mixed, _largest_repair(site, layout) * sum(rate.values())
+        drawn, mixed, math.fsum(rate[name] * largest_repair[name] for name in rate)
     )
     often = {name: rate[name] * fact.reached / fact.releases for name, fact in facts.items()}
     seen = {n: float((found.event == n).mean()) / shares[n] for n in often}
@@ -453,13 +506,16 @@ def _weighted(
     unseen_volume = math.fsum((1.0 - seen[n]) * often[n] * facts[n].volume.mean for n in often)
     spent = drawn.harm + drawn.repair
     by_event = {
-        n: float(spent[found.event == n].sum() / len(spent)) + unseen_harm.get(n, 0.0)
+        n: float(spent[found.event == n].sum() / len(spent)) + unseen_harm[n]
         for n in site.event_names
     }
     correction = math.fsum(unseen_harm.values())
     tolls = []
     for j, mean in enumerate(toll_means(drawn, mixed)):
-        unseen_toll = math.fsum((1.0 - seen[n]) * often[n] * facts[n].toll[j].mean for n in often)
+        unseen_toll = math.fsum(
+            (1.0 - seen[n]) * rate[n] * fact.toll[j].mean * fact.tolled[j] / fact.releases
+            for n, fact in facts.items()
+        )
         tolls.append(mean.moved(unseen_toll))
     both = both.moved(correction)
     return Sums(
@@ -486,7 +542,7 @@ def _mixture(
         known(lambda f, j=j: f.toll[j])  # type: ignore[misc]
         for j in range(min(len(fact.toll) for fact in facts.values()))
     )
-    return Facts(1, 1, known(lambda f: f.harm), known(lambda f: f.volume), 1.0, tolls)
+    return Facts(1, 1, known(lambda f: f.harm), known(lambda f: f.volume), 1.0, 1.0, tolls)
 
 
 def _means(
@@ -506,10 +562,9 @@ def toll_means(own: Account, known: Facts | None) -> tuple[Mean, ...]:
     """Return the means of the columns of the toll over equally weighted releases."""
     if own.toll is None:
         return ()
-    before = known.toll if known is not None and known.toll else (None, None, None)
-    return tuple(
-        cost(values, values > 0.0, prior) for values, prior in zip(own.toll.T, before, strict=True)
-    )
+    before = known.toll if known is not None else (None, None, None)
+    pairs = zip(own.toll.T, before, strict=True)
+    return tuple(cost(values, values > 0.0, prior) for values, prior in pairs)
 
 
 def _correlation(one: Floats, two: Floats) -> float:
@@ -528,10 +583,15 @@ def _probabilities(names: Sequence[str], found: Account, happened: Bools) -> dic
     return out
 
 
-def _largest_repair(site: Site, layout: Layout) -> float:
-    """Return the repair cost of the most expensive barrier that can fail [EUR].
+def _largest_repairs(site: Site, layout: Layout, facts: Mapping[str, Facts]) -> dict[str, float]:
+    """Return the repair cost of the most expensive barrier that can fail, for each event [EUR].
 
-    It is the cost of one fence panel length, the least unit of repair; 0 if no barrier can fail.
+    It is repaired over the mean width of the event, but at least over its least unit of repair, as
+    in `Site.bill`. The cost is 0 if no barrier can fail.
     """
-    prices = site.values(layout).items()
-    return PANEL * max((price for b, price in prices if b.fallible), default=0.0)
+    prices = [(b.repaired, price) for b, price in site.values(layout).items() if b.fallible]
+    widths = {name: facts[name].width if name in facts else 0.0 for name in site.event_names}
+    return {
+        name: max((price * max(width, least) for least, price in prices), default=0.0)
+        for name, width in widths.items()
+    }

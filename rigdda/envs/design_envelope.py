@@ -111,9 +111,14 @@ memory: Memory[bytes, DesignEnvelope] = Memory(256)
 
 
 def stations(zone: BarrierZone) -> list[float]:
-    """Return evenly spaced stations from the start to the end of a zone [m]."""
+    """Return evenly spaced stations from the start to the end of a zone [m].
+
+    Those between the two ends are rounded to millimetres. The ends are exact, so that there is a
+    demand at every chainage of the zone.
+    """
     count = min(MOST_STATIONS, max(2, math.ceil((zone.end - zone.start) / SPACING) + 1))
-    return [float(x) for x in np.linspace(zone.start, zone.end, count).round(3)]
+    inner = np.linspace(zone.start, zone.end, count)[1:-1].round(3)
+    return [zone.start, *inner.tolist(), zone.end]
 
 
 def governing_events(site: Site) -> list[str]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -86,15 +85,13 @@ memory: Memory[bytes, Ensemble] = Memory(4096)
 """Ensembles by site, about 3 kB each."""
 
 
-def of(site: Site, key: bytes, executor: Executor | None = None) -> Ensemble:
+def of(site: Site, key: bytes) -> Ensemble:
     """Return the barrier-free statistics of a site, simulating them if they are not stored.
 
     Parameters
     ----------
     site, key : Site, bytes
         The site and its `fingerprint`.
-    executor : Executor, optional
-        Where to run the simulations; by default in threads on all cores.
 
     Raises
     ------
@@ -105,33 +102,32 @@ def of(site: Site, key: bytes, executor: Executor | None = None) -> Ensemble:
     if known is None:
         known = site_store.read(STORED_AS, key, Ensemble)
         if known is None:
-            known = _simulate(site, executor)
+            known = _simulate(site)
             site_store.write(STORED_AS, key, known)
         memory.remember({key: known})
     return known
 
 
-def _simulate(site: Site, executor: Executor | None) -> Ensemble:
+def _simulate(site: Site) -> Ensemble:
     """Simulate an equal number of releases of each event, then more where they reduce variance."""
     names = site.event_names
-    first = bare_outcomes(site, dict.fromkeys(names, FIRST_ROUND), executor)
+    first = bare_outcomes(site, dict.fromkeys(names, FIRST_ROUND))
     wanted = _shared(_shares(site, _facts(site, _joined(first))), BOTH_ROUNDS)
     counts = {name: max(wanted[name], FIRST_ROUND) for name in names}
-    more = bare_outcomes(site, counts, executor)
+    more = bare_outcomes(site, counts)
     both = _joined(first) + _joined({name: more[name][FIRST_ROUND:] for name in names})
     facts = _facts(site, both)
-    bare = judge(site, (), both, {}, {})
+    shares = _shares(site, facts)
+    bare = judge(site, (), both, facts, shares)
     found = replace(bare, outcomes=(), simulated=len(both), seconds=0.0)
-    return Ensemble(found, facts, _shares(site, facts))
+    return Ensemble(found, facts, shares)
 
 
 BARE = "bare"
 """Name under which outcomes without barriers are stored on disk, about 100 bytes each."""
 
 
-def bare_outcomes(
-    site: Site, counts: Mapping[str, int], executor: Executor | None = None
-) -> dict[str, list[Outcome]]:
+def bare_outcomes(site: Site, counts: Mapping[str, int]) -> dict[str, list[Outcome]]:
     """Return the outcomes of the first releases of each event without new barriers.
 
     They are stored on disk by what affects them, see `rigdda.envs.outcome_cache.release_key`, so
@@ -144,8 +140,6 @@ def bare_outcomes(
     counts : mapping of str to int
         Number of releases of each event; their seeds begin at
         `rigdda.seeds.NO_BARRIERS`.
-    executor : Executor, optional
-        Where to run the simulations; by default in threads on all cores.
 
     Raises
     ------
@@ -166,7 +160,7 @@ def bare_outcomes(
         for i in range(len(known[name]), count)
     ]
     if jobs:
-        for (*_, name), outcome in zip(jobs, outcome_cache.outcomes(jobs, executor), strict=True):
+        for (*_, name), outcome in zip(jobs, outcome_cache.outcomes(jobs), strict=True):
             known[name].append(outcome)
         for name in {name for *_, name in jobs}:
             site_store.write(BARE, _bare_key(site, name), outcome_cache.pack(known[name]))

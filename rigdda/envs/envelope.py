@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import nullcontext
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
@@ -12,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import Run, Simulation, Site
+from rigdda import Run, Simulation, Site, distribution
 from rigdda.envs import site_store
 from rigdda.envs.outcome_cache import Memory, fingerprint
 from rigdda.geometry import polygon_properties
@@ -54,8 +53,9 @@ class Envelope:
     bounce : (2, ZONE_STATIONS) array
         95 % quantile of the height of their centroids above the ground [m].
     deposit : (DEPOSIT_BINS + 2,) array
-        Share of the rock released per year that comes to rest uphill of the zone, in each bin from
-        the start of the zone to the downhill edge of the road, and beyond; adds up to 1.
+        Share of the cross-sectional area of the rock released per year that comes to rest uphill of
+        the zone, in each bin from the start of the zone to the downhill edge of the road, and
+        beyond; adds up to 1.
     """
 
     often: Floats
@@ -131,10 +131,8 @@ def envelope(site: Site) -> Envelope:
     return barrier_free([site])[0]
 
 
-def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> list[Envelope]:
+def barrier_free(sites: Sequence[Site]) -> list[Envelope]:
     """Return the barrier-free envelopes of sites, simulating those that are not stored together.
-
-    The simulations run in threads on all cores, or in `executor`.
 
     Raises
     ------
@@ -150,7 +148,7 @@ def barrier_free(sites: Sequence[Site], executor: Executor | None = None) -> lis
             memory.remember({key: known[key]})
     new = {key: site for key, site in zip(keys, sites, strict=True) if key not in known}
     jobs = {key: _jobs(site) for key, site in new.items()}
-    with nullcontext(executor) if executor else ThreadPoolExecutor() as pool:
+    with ThreadPoolExecutor(distribution.threads()) as pool:
         transits = pool.map(_transit, [job for own in jobs.values() for job in own])
         fresh = {
             key: _summary(new[key], own, list(islice(transits, len(own))))

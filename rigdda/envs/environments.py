@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
 from typing import Any, ClassVar, NamedTuple
 
 import gymnasium
@@ -53,8 +52,8 @@ class Answer(NamedTuple):
     observed: Sample
 
 
-def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> list[Answer | None]:
-    """Simulate all asks together, in threads on all cores or in `executor`.
+def simulate(asks: Sequence[Ask | None]) -> list[Answer | None]:
+    """Simulate all asks together.
 
     Raises
     ------
@@ -69,7 +68,7 @@ def simulate(asks: Sequence[Ask | None], executor: Executor | None = None) -> li
             drawn = [*zip(ask.seeds, events, strict=True), *_observation_releases(ask)]
             jobs += [(ask.problem.site, ask.layout, seed, event) for seed, event in drawn]
             ends += [len(jobs) - len(drawn) + len(ask.seeds), len(jobs)]
-    parts = iter(outcome_cache.outcomes(jobs, executor).split(ends))
+    parts = iter(outcome_cache.outcomes(jobs).split(ends))
     return [None if ask is None else _answer(ask, next(parts), next(parts)) for ask in asks]
 
 
@@ -84,25 +83,21 @@ def _answer(ask: Ask, scored: Sample, observed: Sample) -> Answer:
     return Answer(judged, observed)
 
 
-def simulate_observations(
-    episodes: Sequence[tuple[DesignProblem, int]], executor: Executor | None = None
-) -> list[Sample]:
+def simulate_observations(episodes: Sequence[tuple[DesignProblem, int]]) -> list[Sample]:
     """Simulate the envelopes and the barrier-free observation releases of new episodes together.
 
     Parameters
     ----------
     episodes : sequence of (DesignProblem, int)
         For each episode its problem and the number of observation releases per event.
-    executor : Executor, optional
-        Where to run the simulations; by default in threads on all cores.
 
     Raises
     ------
     Diverged
         If a simulation diverges.
     """
-    barrier_free([problem.site for problem, _ in episodes], executor)
-    answers = simulate([Ask(problem, (), (), releases) for problem, releases in episodes], executor)
+    barrier_free([problem.site for problem, _ in episodes])
+    answers = simulate([Ask(problem, (), (), releases) for problem, releases in episodes])
     return [answer.observed for answer in answers if answer is not None]
 
 

@@ -23,6 +23,9 @@ from rigdda.model.existing import WornFence
 from rigdda.model.partial_factors import PartialFactors
 from rigdda.rounding import between
 
+USE_ROUNDING = 1e-9
+"""Rounding error up to which a utilisation may exceed its limit [-]."""
+
 
 class Action(NamedTuple):
     """What the blocks of an event do at a station, with and without partial factors.
@@ -108,7 +111,7 @@ class Demand:
         """Yield the classes with enough energy, ascending."""
         factors = self.hard.factors
         for name, row in FENCE_CLASSES.items():
-            if self.energy() < factors.rated(name) / factors.energy:
+            if self.energy() * factors.energy <= factors.rated(name) * (1.0 + USE_ROUNDING):
                 yield name, row
 
     @property
@@ -271,7 +274,7 @@ class FenceCheck:
     @property
     def fits(self) -> bool:
         """Whether the fence satisfies the rule."""
-        return self.energy_use < 1.0 and max(self.height_use, self.elongation_use) <= 1.0 + 1e-9
+        return max(self.uses.values()) <= 1.0 + USE_ROUNDING
 
     def rows(self) -> list[SheetRow]:
         """Return the design sheet, factor by factor."""
@@ -349,4 +352,4 @@ def _simulated(event: EventEnvelope) -> str:
 
 
 def _verdict(use: float) -> str:
-    return "satisfied" if use <= 1.0 else "NOT SATISFIED"
+    return "satisfied" if use <= 1.0 + USE_ROUNDING else "NOT SATISFIED"

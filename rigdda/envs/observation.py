@@ -78,8 +78,9 @@ FIELDS: dict[str, Field] = {
     ),
     "deposit": Field(
         DEPOSIT_BINS + 2, 0.2, 0.2,
-        "square root of the share of the annual rock volume that comes to rest uphill of the zone, "
-        "in equal bins from its start to the downhill edge of the road, and beyond",
+        "square root of the share of the cross-sectional area of the annual rock that comes to "
+        "rest uphill of the zone, in equal bins from its start to the downhill edge of the road, "
+        "and beyond",
     ),
     "prices": Field(
         3, -1.2, 0.6,

@@ -14,7 +14,6 @@ import time
 import zlib
 from collections import OrderedDict
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from threading import Lock
@@ -29,6 +28,7 @@ from rigdda import (
     Layout,
     Outcome,
     Site,
+    distribution,
 )
 from rigdda.barriers import Built, Standing, earthworks
 from rigdda.ground.terrain import REACH
@@ -343,15 +343,13 @@ bare_outcomes: Memory[Key, Outcome] = Memory(1 << 16)
 """Outcomes without barriers, about 1 kB each."""
 
 
-def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
+def outcomes(jobs: Sequence[Job]) -> Sample:
     """Return the outcome of every job; identical jobs are simulated once.
 
     Parameters
     ----------
     jobs : sequence of (Site, Layout, int, str)
         The releases.
-    executor : Executor, optional
-        Where to run the simulations; by default in threads on all cores.
 
     Raises
     ------
@@ -371,7 +369,7 @@ def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
     ]
     known = _recall(keys, jobs)
     new = {key: job for key, job in zip(keys, jobs, strict=True) if key not in known}
-    found, seconds = _simulate(list(new.values()), executor)
+    found, seconds = _simulate(list(new.values()))
     fresh = dict(zip(new, found, strict=True))
     _remember(fresh, new)
     known |= fresh
@@ -384,21 +382,15 @@ def outcomes(jobs: Sequence[Job], executor: Executor | None = None) -> Sample:
     return Sample([known[key] for key in keys], ran, seconds)
 
 
-def _simulate(jobs: list[Job], executor: Executor | None) -> tuple[list[Outcome], float]:
-    """Return the outcomes and the processor time of their simulation [s]."""
-    if executor is not None:
-        timed = list(executor.map(_timed, jobs))
-        return [outcome for outcome, _ in timed], sum(seconds for _, seconds in timed)
+def _simulate(jobs: list[Job]) -> tuple[list[Outcome], float]:
+    """Return the outcomes and the processor time of their simulation [s].
+
+    The time is NaN if they are simulated by an executor, see `rigdda.distribution`.
+    """
     start = time.process_time()
     found = rigdda.release_many(jobs) if jobs else []
-    return found, time.process_time() - start
-
-
-def _timed(job: Job) -> tuple[Outcome, float]:
-    """Return an outcome and its processor time; at module level so that it can be pickled."""
-    start = time.process_time()
-    (outcome,) = rigdda.release_many([job])
-    return outcome, time.process_time() - start
+    remote = bool(jobs) and distribution.current() is not None
+    return found, math.nan if remote else time.process_time() - start
 
 
 def _recall(keys: Sequence[Key], jobs: Sequence[Job]) -> dict[Key, Outcome]:

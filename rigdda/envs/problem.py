@@ -13,16 +13,17 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 
 import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigdda import BadInput, Barrier, Layout, Outcome, Site, check
+from rigdda import BadInput, Barrier, Layout, Outcome, Site, check, distribution
 from rigdda.barriers import KINDS
 from rigdda.envs import cost, encoding, ensemble, intervals, outcome_cache
-from rigdda.envs.cost import Evaluation, Risk
+from rigdda.envs.cost import Account, Evaluation, Risk
 from rigdda.envs.intervals import Estimate, Mean, total
 from rigdda.envs.outcome_cache import Sample, fingerprint
 from rigdda.envs.siting import FeasiblePlaces
@@ -78,7 +79,7 @@ class Targets:
         events: Iterable[str],
         reach: Mapping[str, Estimate],
         failure: Mapping[str, Estimate],
-        risk: Risk | None = None,
+        risk: Risk | None,
     ) -> str | None:
         """Return "met", "missed" or "undecided", or None without targets.
 
@@ -88,8 +89,8 @@ class Targets:
             The design events.
         reach, failure : mapping of str to Estimate
             Estimates for each event.
-        risk : Risk, optional
-            Risk to the traffic; needed for the target `individual`.
+        risk : Risk or None
+            Risk to the traffic; None only if there is no target `individual`.
         """
         states = {
             decide(seen[event], greatest)
@@ -97,7 +98,8 @@ class Targets:
             if greatest is not None
             for event in events
         }
-        if self.individual is not None and risk is not None:
+        if self.individual is not None:
+            assert risk is not None, "the target `individual` needs [traffic]"
             states.add(decide_mean(risk.individual, self.individual))
         return next((state for state in (MISSED, UNDECIDED, MET) if state in states), None)
 
@@ -509,8 +511,8 @@ class DesignProblem:
         seeds : sequence of int
             Distinct seeds of the releases.
         executor : Executor, optional
-            Where to run the simulations, for example a process pool; by default in threads on all
-            cores. The result is the same.
+            Where to run the simulations, for example a process pool; by default that of
+            `rigdda.distribution.using`, or threads on all cores. The result is the same.
 
         Raises
         ------
@@ -520,16 +522,12 @@ class DesignProblem:
             If a simulation diverges.
         """
         standing, drawn = self._standing(layout), checked_seeds("seeds", seeds)
-        pairs = zip(drawn, events_of_seeds(self.shares, drawn), strict=True)
-        jobs = [(self.site, standing, seed, event) for seed, event in pairs]
-        return self.judge(standing, outcome_cache.outcomes(jobs, executor), drawn)
+        with distribution.using(executor) if executor else nullcontext():
+            pairs = zip(drawn, events_of_seeds(self.shares, drawn), strict=True)
+            jobs = [(self.site, standing, seed, event) for seed, event in pairs]
+            return self.judge(standing, outcome_cache.outcomes(jobs), drawn)
 
-    def sample(
-        self,
-        layout: Sequence[Barrier],
-        seeds: Mapping[str, Sequence[int]],
-        executor: Executor | None = None,
-    ) -> Sample:
+    def sample(self, layout: Sequence[Barrier], seeds: Mapping[str, Sequence[int]]) -> Sample:
         """Return the outcomes of releases of chosen events, in the order of `seeds`.
 
         Raises
@@ -537,9 +535,9 @@ class DesignProblem:
         BadInput, Diverged
             As `evaluate` does, and if there is no such event.
         """
-        return self.sample_many([(layout, seeds)], executor)[0]
+        return self.sample_many([(layout, seeds)])[0]
 
-    def sample_many(self, asks: Sequence[Ask], executor: Executor | None = None) -> list[Sample]:
+    def sample_many(self, asks: Sequence[Ask]) -> list[Sample]:
         """Return the samples of several layouts, simulated together; see `sample`.
 
         The processor time is divided in proportion to the number of simulated releases.
@@ -553,7 +551,7 @@ class DesignProblem:
                 drawn = checked_seeds(f"seeds[{event!r}]", seeds, 0)
                 jobs += [(self.site, standing, seed, event) for seed in drawn]
             ends.append(len(jobs))
-        return outcome_cache.outcomes(jobs, executor).split(ends)
+        return outcome_cache.outcomes(jobs).split(ends)
 
     def judge(
         self, layout: Layout, outcomes: Sequence[Outcome], seeds: Sequence[int] = ()
@@ -568,17 +566,25 @@ class DesignProblem:
         BadInput
             If there are no outcomes, or none of an event with a non-zero rate.
         """
-        known = self._known
-        found = cost.judge(self.site, layout, outcomes, known.facts, self.shares)
-        without = known.nothing.debris
+        found = cost.judge(self.site, layout, outcomes, self._known.facts, self.shares)
         return replace(
             found,
             seeds=tuple(seeds),
-            debris_share=found.debris / without if without else 0.0,
             targets=self.state(found),
             simulated=getattr(outcomes, "simulated", len(outcomes)),
             seconds=getattr(outcomes, "seconds", 0.0),
         )
+
+    def judge_account(self, layout: Layout, found: Account) -> Evaluation:
+        """Return the evaluation of a layout from the account of its releases; see `judge`.
+
+        Raises
+        ------
+        BadInput
+            If there are no releases of an event with a non-zero rate.
+        """
+        judged = cost.judge_account(self.site, layout, found, self._known.facts, self.shares)
+        return replace(judged, targets=self.state(judged))
 
     def reward(self, evaluation: Evaluation) -> float:
         """Return the reduction of Z divided by Z without barriers.
@@ -640,7 +646,8 @@ class DesignProblem:
             fact = facts[name]
             known, killed = fact.toll[2], list(fatalities.get(name, ()))
             if not killed:
-                killed = [known.mean] * fact.reached + [0.0] * (fact.releases - fact.reached)
+                count = fact.tolled[2]
+                killed = [known.mean] * count + [0.0] * (fact.releases - count)
             own = np.array(killed, dtype=np.float64)
             mean = intervals.cost(own, own > 0.0, known)
             parts.append(mean.times(site.rate(name, layout)))

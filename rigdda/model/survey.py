@@ -61,7 +61,6 @@ FOREIGN = {
 """Spellings of units that are not metres, with letters only."""
 
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
-SURVEY_NUMBER = re.compile(r"[+-]?\d+([.,]\d+)?")
 STATION = re.compile(r"([+-]?)(\d+)\+(\d{3}(?:[.,]\d+)?)")
 """A chainage with the kilometres before a plus sign, such as 12+345.60."""
 

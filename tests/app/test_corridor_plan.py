@@ -484,7 +484,7 @@ def test_options_are_judged_by_the_risk_to_life() -> None:
     corridor = Corridor.load(EXAMPLE)
     problem = CorridorProblem(corridor).problems[3]
     found = problem.evaluate((), range(60))
-    option = planning.Option((), 0.0, 0.0, [found])
+    option = planning.Option((), 0.0, 0.0, found)
     risk = found.risk.individual.high
     expected = max(0.0, 1.0 - 1e-5 / risk) if risk > 0.0 else 0.0
     assert option.missed(problem) == pytest.approx(expected)
@@ -577,9 +577,10 @@ def test_a_missed_target_is_judged_by_all_releases() -> None:
     problem = DesignProblem("verge", targets={"reach": 0.5})
     layout = (Fence(problem.zone.start + 2.0, 4.0, energy_class=500),)
     few, many = (problem.evaluate(layout, seeds=range(*ends)) for ends in ((0, 20), (20, 220)))
-    option = planning.Option(layout, 0.0, 0.0, [few])
+    option = planning.Option(layout, 0.0, 0.0)
+    option.add(problem, few.outcomes)
     alone = option.missed(problem)
-    option.report = many
+    option.add_report(problem, many)
     events = [event.name for event in problem.site.events if event.design]
     bounds = [
         upper_bound(

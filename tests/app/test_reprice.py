@@ -85,7 +85,6 @@ def from_scratch(site: Site, problem: DesignProblem, kept: archive.Archive) -> l
     seeds = {n: range(NO_BARRIERS, NO_BARRIERS + counts[n].releases) for n in counts}
     bare = anew(site, (), [(seed, name) for name in site.event_names for seed in seeds[name]])
     facts = ensemble._facts(site, bare)
-    nothing = judge(site, (), bare, {}, {})
     events = DesignProblem(kept.site).plan(release_seeds("verification", kept.seed, VERIFIED))
     drawn = list(zip(release_seeds("verification", kept.seed, VERIFIED), events, strict=True))
     found = []
@@ -93,8 +92,7 @@ def from_scratch(site: Site, problem: DesignProblem, kept: archive.Archive) -> l
         layout = archive.layout_of(tables)
         outcomes = anew(site, layout, drawn)
         one = judge(site, layout, outcomes, facts, kept.shares)
-        share = one.debris / nothing.debris if nothing.debris else 0.0
-        found.append(replace(one, debris_share=share, targets=problem.state(one), outcomes=()))
+        found.append(replace(one, targets=problem.state(one), outcomes=()))
     return found
 
 

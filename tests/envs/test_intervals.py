@@ -77,7 +77,7 @@ def test_a_sound_layout_misses_a_target_in_5_percent_for_each_event(
 
 def decide_all(events: tuple[str, ...], seen: list[Estimate], target: float) -> str | None:
     """Return whether the probabilities of all events are at most a target."""
-    return Targets(reach=target).state(events, dict(zip(events, seen, strict=True)), {})
+    return Targets(reach=target).state(events, dict(zip(events, seen, strict=True)), {}, None)
 
 
 def test_without_releases_nothing_is_known() -> None:
@@ -166,7 +166,7 @@ def test_quantiles_are_student_s() -> None:
 
 def test_harm_without_a_block_on_the_road_is_rare_harm() -> None:
     """A wall that slides onto the road: seen in none of 16, it may still come."""
-    known = Facts(100, 50, Known(1000.0, 0.1), Known(1.0, 0.1), 1.0)
+    known = Facts(100, 50, Known(1000.0, 0.1), Known(1.0, 0.1), 1.0, 1.0)
     harm = np.array([900.0] + [0.0] * 15)
     none, failed = np.zeros(16, dtype=bool), np.eye(1, 16, dtype=bool)[0]
     own = Account(np.full(16, "block"), harm, np.zeros(16), np.zeros(16), none, failed)

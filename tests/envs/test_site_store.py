@@ -229,7 +229,7 @@ STORED = (
 )  # fmt: skip
 """Classes of stored values."""
 
-FORMS = {1: "0b161c84c1bae8bc"}
+FORMS = {2: "cb1dbdd5f220a843"}
 """Hash of the fields of these classes by the version of the form."""
 
 

@@ -16,22 +16,32 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
-from rigdda import MECHANICS, BadInput, Corridor, Layout, __version__, check, distribution
+from rigdda import (
+    MECHANICS,
+    BadInput,
+    Corridor,
+    Layout,
+    Outcome,
+    __version__,
+    check,
+    distribution,
+)
 from rigdda.agents.corridor import allocation, programme
 from rigdda.agents.corridor.programme import SIMPLE_METHODS, Choice, Increment, Options
 from rigdda.agents.designers import front
 from rigdda.agents.designers.protocol import Entry
-from rigdda.agents.designers.store import Store
+from rigdda.agents.designers.store import Store, identity
 from rigdda.agents.limits import SEED
 from rigdda.barriers import from_table, to_tables
 from rigdda.envs import CorridorEvaluation, CorridorProblem, DesignProblem, Evaluation
-from rigdda.envs.intervals import Estimate, Mean, estimate, total
+from rigdda.envs.cost import Account, account
+from rigdda.envs.intervals import Mean
 from rigdda.envs.problem import excess
 from rigdda.files import atomic
 from rigdda.seeds import derive, release_seeds
@@ -69,7 +79,7 @@ Tick = Callable[[int, str], None]
 
 @dataclass(slots=True)
 class Option:
-    """A layout of a section with its evaluations in one or more batches of releases.
+    """A layout of a section with its evaluations.
 
     Attributes
     ----------
@@ -77,26 +87,45 @@ class Option:
         The layout.
     cost, annual : float
         Construction cost [EUR/m] and annual cost [EUR/m and year].
-    batches : list of Evaluation
-        Evaluations that affect choices.
-    report : Evaluation or None
-        Evaluation on releases that do not affect any choice.
+    known : Evaluation or None
+        Evaluation on the releases that affect choices, None before the first.
+    account : Account or None
+        Costs of these releases; None for the layout without barriers, which is known from the
+        stored releases of the site.
+    report, overall : Evaluation or None
+        Evaluation on releases that do not affect any choice, and on all releases.
     """
 
     layout: Layout
     cost: float
     annual: float
-    batches: list[Evaluation] = field(default_factory=list)
+    known: Evaluation | None = None
+    account: Account | None = None
     report: Evaluation | None = None
+    overall: Evaluation | None = None
+
+    def add(self, problem: DesignProblem, outcomes: Sequence[Outcome]) -> None:
+        """Add releases that affect choices."""
+        new = account(problem.site, self.layout, outcomes)
+        self.account = new if self.account is None else Account.join([self.account, new])
+        self.known = problem.judge_account(self.layout, self.account)
+
+    def add_report(self, problem: DesignProblem, evaluation: Evaluation) -> None:
+        """Add an evaluation on releases that do not affect any choice, with its outcomes."""
+        assert self.account is not None
+        new = account(problem.site, self.layout, evaluation.outcomes)
+        self.report = replace(evaluation, outcomes=())
+        self.overall = problem.judge_account(self.layout, Account.join([self.account, new]))
 
     @property
     def releases(self) -> int:
-        """Number of releases of the batches."""
-        return sum(evaluation.releases for evaluation in self.batches)
+        """Number of releases that affect choices."""
+        return self.known.releases if self.known is not None else 0
 
     def value(self) -> Mean:
-        """Return Z from all batches [EUR/m and year]."""
-        return joined([(Mean(e.objective, *e.ci), e.releases) for e in self.batches])
+        """Return Z from the releases that affect choices [EUR/m and year]."""
+        assert self.known is not None
+        return Mean(self.known.objective, *self.known.ci)
 
     @property
     def error(self) -> float:
@@ -110,28 +139,15 @@ class Option:
         All releases of the layout count, including those that do not affect any choice.
         """
         over, targets = [0.0], problem.targets
-        known = [*self.batches, *([self.report] if self.report is not None else [])]
+        found = self.overall or self.known
+        assert found is not None
         for event in problem.site.events:
             if event.design:
-                for wanted, name in ((targets.reach, "reach"), (targets.failure, "failure")):
-                    if wanted is not None:
-                        seen = [getattr(e, name)[event.name] for e in known]
-                        over.append(_joined(seen).bound - wanted)
-        if targets.individual is not None:
-            risks = [(e.risk.individual, e.releases) for e in known if e.risk is not None]
-            over.append(excess(joined(risks).high, targets.individual))
+                pairs = (targets.reach, found.reach), (targets.failure, found.failure)
+                over += [seen[event.name].bound - wanted for wanted, seen in pairs if wanted]
+        if targets.individual is not None and found.risk is not None:
+            over.append(excess(found.risk.individual.high, targets.individual))
         return max(over)
-
-
-def joined(means: Sequence[tuple[Mean, int]]) -> Mean:
-    """Return the mean of independent samples from their means and numbers of releases."""
-    whole = sum(releases for _, releases in means)
-    return total(mean.times(releases / whole) for mean, releases in means)
-
-
-def _joined(seen: Sequence[Estimate]) -> Estimate:
-    """Return a probability from several samples."""
-    return estimate(sum(one.count for one in seen), sum(one.releases for one in seen))
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,7 +251,8 @@ class Planner:
         self.used = 0
         self._tick = tick or (lambda done, words: None)
         self._folder = folder
-        self._store = Store(None if folder is None else folder / "evaluations.jsonl")
+        file = None if folder is None else folder / "evaluations.jsonl"
+        self._store = Store(file, outcomes=True)
         self.fronts: list[list[Option]] = []
 
     def plan(self) -> CorridorPlan:
@@ -261,6 +278,10 @@ class Planner:
         """Return the seed of the releases of a section."""
         return derive(self.seed, s)
 
+    def _least(self, s: int) -> int:
+        """Return the number of releases with which every event of a section has at least two."""
+        return 2 * len(self.problem.problems[s].site.events)
+
     def _name(self, s: int) -> str:
         return self.problem.corridor.sections[s].name
 
@@ -268,8 +289,7 @@ class Planner:
         """Search the front of every section."""
         budget = int(SEARCH_SHARE * self.releases)
         asks = [(problem, budget, self._seed(s)) for s, problem in enumerate(self.problem.problems)]
-        own = [(p.key.hex(), p.kinds, p.max_barriers, *ask) for p, *ask in asks]
-        files = [self._file("front", *values) for values in own]
+        files = [self._file("front", identity(p), *ask) for p, *ask in asks]
         found = [_read(file) for file in files]
         new = distribution.mapped(
             self._searched if distribution.current() is None else _searched,
@@ -298,7 +318,7 @@ class Planner:
         return front.layouts(problem, budget, seed, told, Store(path))
 
     def evaluate(self, stream: str, wanted: Sequence[tuple[int, int, int]]) -> list[Evaluation]:
-        """Evaluate options on releases of a stream.
+        """Evaluate options on releases of a stream; the evaluations contain the outcomes.
 
         `wanted` gives the section, the option and the number of releases. In the stream of choices,
         releases follow those of earlier batches.
@@ -320,18 +340,19 @@ class Planner:
         """Evaluate options on further releases that affect choices."""
         found = self.evaluate(CHOICES, wanted)
         for (s, k, _), evaluation in zip(wanted, found, strict=True):
-            self.fronts[s][k].batches.append(evaluation)
+            self.fronts[s][k].add(self.problem.problems[s], evaluation.outcomes)
 
     def compare(self) -> None:
         """Evaluate the options for the choice: evenly, or where it changes the choice."""
         whole = int(CHOICE_SHARE * self.releases * len(self.fronts))
         built = [(s, k) for s, own in enumerate(self.fronts) for k, o in enumerate(own) if o.layout]
         for s, options in enumerate(self.fronts):
-            options[0].batches.append(self.problem.problems[s].nothing)
+            options[0].known = self.problem.problems[s].nothing
         each = max(LEAST_PER_LAYOUT, whole // max(1, len(built)))
         first = max(LEAST_PER_LAYOUT, min(USUAL_PER_LAYOUT, each // 2)) if self.margin else each
-        self._add([(s, k, first) for s, k in built])
-        spent = first * len(built)
+        wanted = [(s, k, max(first, self._least(s))) for s, k in built]
+        self._add(wanted)
+        spent = sum(count for _, _, count in wanted)
         for done in range(ROUNDS if self.margin else 0):
             counts = allocation.batches(
                 self.estimates(), self._prices(), whole * (done + 1) // ROUNDS - spent
@@ -411,7 +432,7 @@ class Planner:
         count = min(MOST_REPORTED, max(LEAST_REPORTED, each))
         found = self.evaluate("report", [(s, k, count) for s, k in built])
         for (s, k), evaluation in zip(built, found, strict=True):
-            self.fronts[s][k].report = evaluation
+            self.fronts[s][k].add_report(self.problem.problems[s], evaluation)
 
     def _judged(self, choice: Choice) -> CorridorEvaluation:
         """Return the evaluation of a choice from the reports of its options."""

@@ -22,6 +22,7 @@ from rigdda import (
     Mesh,
     Simulation,
     Site,
+    distribution,
 )
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import Ledger
@@ -175,7 +176,7 @@ def _simulate(
         out["mass"] = density[out["block"]] * out["volume"]
         return out, width
 
-    with ThreadPoolExecutor() as pool:
+    with ThreadPoolExecutor(distribution.threads()) as pool:
         parts = list(pool.map(one, enumerate(jobs)))
     crossings, widths = zip(*parts, strict=True)
     number = {name: i for i, name in enumerate(site.event_names)}

@@ -3,21 +3,19 @@
 The algorithm is that of Deb et al. (2002, IEEE TEC 6, 182-197), as implemented in Optuna.
 
 The search starts from the layouts that an ensemble of releases without barriers suggests (see
-`rigdda.agents.designers.convex`) or from layouts that other designers found. Layouts that are
-non-dominated in the search are evaluated again on other releases. Those that are non-dominated in
-these releases form the front. Thus no layout is in the front because of favourable releases in the
-search.
+`rigdda.agents.designers.convex`). Layouts that are non-dominated in the search are evaluated again
+on other releases. Those that are non-dominated in these releases form the front. Thus no layout is
+in the front because of favourable releases in the search.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
-from rigdda import Layout, check
+from rigdda import Layout
 from rigdda.agents.designers import tpe
 from rigdda.agents.designers.convex import starts
 from rigdda.agents.designers.protocol import (
@@ -67,41 +65,7 @@ def design(
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     ledger = Ledger(problem, simulations, seed, progress, store)
-    return _search(ledger, starts(ledger), 0)
-
-
-def warm_started(
-    problem: DesignProblem,
-    layouts: Sequence[Layout],
-    simulations: int,
-    seed: int = 0,
-    progress: Progress | None = None,
-    store: Store | None = None,
-) -> ParetoResult:
-    """Return the result of a search that starts from layouts which other designers found.
-
-    These layouts are always evaluated again on other releases, whatever their evaluations in the
-    search are.
-
-    Raises
-    ------
-    BadInput
-        If the budget is below 2, the seed is out of range, or the number of different layouts is
-        not between 1 and `FINALISTS` / 2 - 1.
-    Diverged
-        If a simulation diverges.
-    """
-    different = list(dict.fromkeys(layouts))
-    check.integer("number of different layouts", len(different), 1, FINALISTS // 2 - 1)
-    ledger = Ledger(problem, simulations, seed, progress, store)
-    ledger.starts |= set(different)
-    return _search(ledger, different, len(different))
-
-
-def _search(ledger: Ledger, first: list[Layout], known: int) -> ParetoResult:
-    """Search from some starting layouts, of which the first `known` always reach the finals."""
-    choose = partial(finalists, known=known)
-    found = search(ledger, _propose(ledger.problem, first, ledger.seed), choose, FINALISTS)
+    found = search(ledger, _propose(problem, starts(ledger), seed), finalists, FINALISTS)
     ends = found.history.stage("final") or found.history.stage("search")
     own = {name: getattr(found, name) for name in DesignResult.__dataclass_fields__}
     return ParetoResult(**own, front=front(entry.evaluation for entry in ends))
@@ -122,20 +86,15 @@ def front(evaluations: Iterable[Evaluation]) -> tuple[Evaluation, ...]:
 
 
 def finalists(
-    problem: DesignProblem, evaluations: Sequence[Evaluation], n: int, known: int = 0
+    problem: DesignProblem, evaluations: Sequence[Evaluation], n: int
 ) -> list[Evaluation]:
-    """Return at most `n` finalists.
-
-    These are the first `known` evaluations, the best of the front and others spread evenly over it.
-    """
-    kept = list(evaluations[: min(known, n)])
-    seen, room = {e.layout for e in kept}, n - len(kept)
-    found = [e for e in front(evaluations) if e.layout not in seen]
-    if len(found) > room:
-        best = min(range(len(found)), key=lambda i: score(problem, found[i]))
-        spread = np.linspace(0, len(found) - 1, max(0, room - 1)).round().astype(int).tolist()
-        found = [found[i] for i in sorted({best, *spread})[:room]]
-    return kept + found
+    """Return at most `n` finalists: the best of the front and others spread evenly over it."""
+    found = front(evaluations)
+    if len(found) <= n:
+        return list(found)
+    best = min(range(len(found)), key=lambda i: score(problem, found[i]))
+    spread = np.linspace(0, len(found) - 1, max(0, n - 1)).round().astype(int).tolist()
+    return [found[i] for i in sorted({best, *spread})[:n]]
 
 
 def _propose(problem: DesignProblem, first: list[Layout], seed: int) -> Proposals:

@@ -187,7 +187,8 @@ class DesignResult:
         Descriptions of the properties of the layout that lie on a bound of the zone, of the kind of
         barrier or of the list of energy classes.
     seconds : float
-        Processor time on all cores [s]; it is ignored when results are compared.
+        Processor time of this process, on all cores [s]. The time of the workers of an executor
+        does not count. It is ignored when results are compared.
     tried : tuple of TriedLayout
         What the search found out about every layout that it evaluated; empty if the site has no
         design events.

@@ -150,7 +150,7 @@ class Store:
     When a search is run again, it requests the same layouts on the same seeds. Evaluations in the
     store are then returned without a simulation. They are identified by everything that determines
     them, so that an entry of another site, problem, seed or version of the mechanics is never
-    returned. Evaluations from a store never contain outcomes.
+    returned. Their evaluations do not contain outcomes, except those of `evaluate_many`.
 
     The file contains JSON lines. A database is not needed, because one process writes the file,
     entries are only appended, and all of them are read once at the start. A copy that was made at
@@ -206,7 +206,8 @@ class Store:
             )
             warnings.warn(told, DoubtfulInput, stacklevel=3)
         self._kept = set(self._known)
-        os.truncate(path, whole)
+        if whole < len(text):
+            os.truncate(path, whole)
 
     def evaluate(self, problem: DesignProblem, layout: Layout, seeds: Sequence[int]) -> Evaluation:
         """Return the evaluation of a layout on release seeds from the store or a simulation.
@@ -228,7 +229,8 @@ class Store:
         """Yield the evaluations of several layouts, each on release seeds of its own.
 
         Those that are not in the store are computed by the executor in use, see
-        `rigdda.distribution`, each by one worker.
+        `rigdda.distribution`, each by one worker. The evaluations contain their outcomes if the
+        store keeps them.
 
         Raises
         ------
@@ -236,11 +238,13 @@ class Store:
             The same errors as `DesignProblem.evaluate`.
         """
         keys = [_key(problem, layout, tuple(seeds)) for problem, layout, seeds in asks]
-        new = [ask for key, ask in zip(keys, asks, strict=True) if self._stored(key) is None]
-        found = distribution.mapped(partial(_evaluated, keeps=self._keeps), new)
+        new = {k: ask for k, ask in zip(keys, asks, strict=True) if self._stored(k) is None}
+        found = distribution.mapped(partial(_evaluated, keeps=self._keeps), list(new.values()))
         for key, (_, layout, seeds) in zip(keys, asks, strict=True):
-            kept = self._recall(key, layout, tuple(seeds), lambda: next(found))
-            yield replace(kept.evaluation, layout=layout, seeds=tuple(seeds))
+            drawn = tuple(seeds)
+            kept = self._recall(key, layout, drawn, lambda: next(found))
+            outcomes = tuple(unpack(kept.outcomes)) if self._keeps else ()
+            yield replace(kept.evaluation, layout=layout, seeds=drawn, outcomes=outcomes)
 
     def sample(
         self, problem: DesignProblem, layout: Layout, seeds: Mapping[str, Sequence[int]]

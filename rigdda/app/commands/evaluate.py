@@ -75,10 +75,10 @@ def evaluate(
         entrants["policy"] = using(load(policy))
     places = contest.site_names(split, sites)
     folder = folder_for(out, "evaluate", "evaluations.jsonl", "scores.csv")
-    store = Store(folder / "evaluations.jsonl")
     with recorded_run(folder), progress(len(places) * len(entrants)) as tick:
+        store = Store(folder / "evaluations.jsonl")
         scores = contest.hold(places, entrants, budget, verify, seed, store, tick)
-    tables.write_rows(folder / "scores.csv", [score.row() for score in scores])
+        tables.write_rows(folder / "scores.csv", [score.row() for score in scores])
     click.echo("EUR per metre of road and year; best: the cheapest of these designers and of no "
                "barrier on each site")  # fmt: skip
     show(contest.table(scores))

@@ -36,6 +36,6 @@ def fidelity(site: str, releases: int, seed: int, out: Path | None) -> None:
     folder = folder_for(out, f"fidelity-{where.name}", "fidelity.csv")
     with recorded_run(folder, where), progress(6 * releases) as tick:
         found = fidelity_bias.compare(where, releases, seed, tick)
-    fidelity_bias.write(folder / "fidelity.csv", where, found)
+        fidelity_bias.write(folder / "fidelity.csv", where, found)
     show(fidelity_bias.table(found))
     click.echo(f"{releases} releases of each; fidelity.csv is in {folder}")

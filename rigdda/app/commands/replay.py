@@ -56,12 +56,12 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     folder = folder_for(out, f"replay-{where.name}", "episode.rrd")
     with recorded_run(folder, where):
         run, outcome = rigdda.release(where, barriers, seed, event)
-    came = f"{outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3"
-    notes = {"event": outcome.event, "seed": str(seed), "volume on the road": came}
-    if words := findings.of_layout(where, barriers, event):
-        notes["note"] = words
-        note(words)
-    road, labels = (where.road.start, where.road.end), where.labels(barriers)
-    record = release_record(where, barriers, seed, event, outcome)
-    run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels, record))
+        came = f"{outcome.road_volume:.2g} of {outcome.released_volume:.2g} m3"
+        notes = {"event": outcome.event, "seed": str(seed), "volume on the road": came}
+        if words := findings.of_layout(where, barriers, event):
+            notes["note"] = words
+            note(words)
+        road, labels = (where.road.start, where.road.end), where.labels(barriers)
+        record = release_record(where, barriers, seed, event, outcome)
+        run.to_rerun(folder / "episode.rrd", Marks(road, notes, where.name, labels, record))
     click.echo(folder / "episode.rrd")

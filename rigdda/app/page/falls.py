@@ -161,6 +161,8 @@ class Release:
         What is computed so far; it only grows.
     done, asked : int
         Number of releases that are computed, with seeds from 0, and that were asked for.
+    running : bool
+        Whether releases are being computed.
     fault : str
         Why the computing ended early; empty if it did not.
     """
@@ -170,25 +172,23 @@ class Release:
         self.falls: list[Fall] = []
         self.done = self.asked = 0
         self.fault = ""
-        self._stop = threading.Event()
+        self.running = False
+        self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
-
-    @property
-    def running(self) -> bool:
-        """Whether releases are being computed."""
-        return self._thread is not None and self._thread.is_alive()
 
     def more(self, count: int) -> None:
         """Compute more releases."""
-        self.asked += count
-        if not self.running:
-            self._stop.clear()
-            self._thread = threading.Thread(target=self._work, name="releases", daemon=True)
-            self._thread.start()
+        with self._lock:
+            self.asked += count
+            if not self.running:
+                self.running = True
+                self._thread = threading.Thread(target=self._work, name="releases", daemon=True)
+                self._thread.start()
 
     def stop(self) -> None:
         """Stop after the releases that are being computed."""
-        self._stop.set()
+        with self._lock:
+            self.asked = self.done
 
     def join(self) -> None:
         """Wait until the releases that were asked for are computed."""
@@ -197,21 +197,32 @@ class Release:
 
     def _work(self) -> None:
         try:
-            while self.done < self.asked and not self._stop.is_set():
+            while self._unfinished():
                 self._compute(range(self.done, self.asked))
         except Error as error:
             self.fault = str(error)
         except Exception as error:  # shown on the page
             traceback.print_exc()
             self.fault = f"{type(error).__name__}: {error}"
-        self.asked = self.done
+        if self.fault:
+            with self._lock:
+                self.asked, self.running = self.done, False
+
+    def _unfinished(self) -> bool:
+        """Return whether more releases were asked for; the thread ends if not."""
+        with self._lock:
+            self.running = self.done < self.asked
+            self.asked = max(self.asked, self.done)
+            return self.running
 
     def _compute(self, seeds: range) -> None:
         """Compute releases until they are done or stopped."""
         parts = trajectory_parts(self.site, self.layout, self.event, seeds, size=SIZE)
         for found in parts:
             self.falls += falls_of(self.site, found)
-            self.done += len(found.seed)
-            if self._stop.is_set():
+            with self._lock:
+                self.done += len(found.seed)
+                stopped = self.done >= self.asked
+            if stopped:
                 parts.close()
                 return

@@ -71,7 +71,7 @@ def results_of(site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Out
         )
         for name in layouts
     )  # fmt: skip
-    together = _joined(list(accounts.values()))
+    together = Account.join(list(accounts.values()))
     outcomes = [outcome for name in layouts for outcome in flat[name]]
     released = np.array([outcome.released_volume for outcome in outcomes])
     widths = np.array([outcome.width for outcome in outcomes])
@@ -80,18 +80,6 @@ def results_of(site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Out
         own = together.event == event
         facts[event] = learn(site, together.of(own), released[own], widths[own], 1.0)
     return StudyResults(site, studied, facts)
-
-
-def _joined(parts: list[Account]) -> Account:
-    """Return the account of several accounts one after another."""
-    tolls = [part.toll for part in parts if part.toll is not None]
-
-    def column(name: str) -> Any:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    names = ("event", "harm", "repair", "volume", "reached", "failed")
-    toll = np.concatenate(tolls) if tolls else None
-    return Account(**{name: column(name) for name in names}, toll=toll)
 
 
 def broken_rules(site: Site, layout: Layout) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import rigdda
 from rigdda.agents.corridor.planning import OPTIMUM, BudgetPlan, CorridorPlan
 from rigdda.agents.corridor.programme import RATIO
 from rigdda.agents.designers.frontier import worst
-from rigdda.app.reports.pictures import DPI, EVENTS, FONT, save
+from rigdda.app.reports.pictures import EVENTS, FONT, save
 from rigdda.app.reports.tables import empty_table, write_rows
 from rigdda.app.reports.wording import euros, percent
 from rigdda.barriers import KINDS, Built
@@ -441,4 +441,4 @@ def _row(
                      align="edge", color=colours[kind], linewidth=0)  # fmt: skip
 
 
-__all__ = ["CORRIDOR_FILES", "DPI", "table_of_budgets", "table_of_sections", "write"]
+__all__ = ["CORRIDOR_FILES", "table_of_budgets", "table_of_sections", "write"]

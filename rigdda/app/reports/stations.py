@@ -124,6 +124,17 @@ class Passing(NamedTuple):
         """Return how often a release has at least one of some rows [1/year per 100 m]."""
         return total(self._frequency(name, rows) for name in self._drawn(group))
 
+    def probability(self, group: str, rows: NDArray[np.void]) -> Mean:
+        """Return the probability that a release has at least one of some rows.
+
+        That of all events is weighted by their rates, of which one must be above 0.
+        """
+        if group == ALL_EVENTS:
+            numbers = [self.site.event_names.index(name) for name in self._drawn(group)]
+            return self.frequency(group, rows).times(1.0 / float(self.rate[numbers].sum()))
+        chance = self.chance(group, rows)
+        return Mean(chance.probability, chance.low, chance.high)
+
     def _drawn(self, group: str) -> list[str]:
         """Return the events of a group that were simulated."""
         names = self.events if group == ALL_EVENTS else [group]
@@ -317,15 +328,13 @@ def _beyond(passing: Passing, group: str, grid: Floats) -> Iterator[dict[str, An
     if not len(table):
         return
     weight = passing.sample(group, table, table["x"]).weight
-    whole = passing.frequency(group, table).value
     for x in grid.tolist():
         beyond = (table["x"] > x) | (table["state"] == HAS_LEFT)
-        often = passing.frequency(group, table[beyond])
         yield {
             "event": group, "x_m": x, **survey_place(passing.site, x),
             "releases": len(passing.releases(group)),
-            **_ends("probability", often.times(1.0 / whole) if whole > 0.0 else often),
-            **_ends("rate", often),
+            **_ends("probability", passing.probability(group, table[beyond])),
+            **_ends("rate", passing.frequency(group, table[beyond])),
             "share_of_blocks": float(weight[beyond].sum() / weight.sum()),
         }  # fmt: skip
 

@@ -405,8 +405,8 @@ def fit(
     model : {"blocks", "lumped"}
         Model that computes the values; "lumped" computes run-outs only.
     out : path, optional
-        Folder in which computed values are kept until `forget` is called. A fit that was killed
-        continues from there.
+        Folder in which computed values are kept until `rigdda.files.remove_unfinished`, so that a
+        fit that was killed continues from there.
 
     Raises
     ------
@@ -432,7 +432,7 @@ def fit(
             known = computed(changed, sets, model, seeds)
             if file is not None:
                 with atomic(file) as part, part.open("wb") as opened:
-                    arrays: dict[str, Any] = dict(zip(_columns(sets), known.values(), strict=True))
+                    arrays: dict[str, Any] = {c: known[n] for n, c in _columns(sets).items()}
                     np.savez(opened, **arrays)
         return known
 
@@ -441,9 +441,9 @@ def fit(
     return found._replace(site=best, sets=sets)
 
 
-def _columns(sets: DataSets) -> list[str]:
-    """Return a name without special characters for each set of observations."""
-    return [f"set_{i}" for i in range(len(sets))]
+def _columns(sets: DataSets) -> dict[str, str]:
+    """Return a name without special characters for each set of observations, by its name."""
+    return {name: f"observations_{i}" for i, name in enumerate(sets)}
 
 
 def _key(site: Site, sets: DataSets, model: Model, seeds: range) -> str:
@@ -458,7 +458,7 @@ def _read(file: Path, sets: DataSets) -> dict[str, Floats] | None:
     """Return the computed values in a file, None if there is none or it is damaged."""
     try:
         with np.load(file) as stored:
-            return {name: stored[key] for name, key in zip(sets, _columns(sets), strict=True)}
+            return {name: stored[column] for name, column in _columns(sets).items()}
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
         return None
 

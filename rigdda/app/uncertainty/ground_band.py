@@ -9,7 +9,7 @@ are evaluated on the same releases.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -28,15 +28,12 @@ from rigdda.app.uncertainty.parameters import (
     site_at,
 )
 from rigdda.app.uncertainty.varied_sites import Priced, SimulatedSite, noise, price, simulate
-from rigdda.envs import DesignProblem, Evaluation
-from rigdda.envs.cost import judge
+from rigdda.envs import DesignProblem, Evaluation, ensemble
+from rigdda.envs.cost import Facts, judge
 from rigdda.seeds import release_seeds
 
 Floats = NDArray[np.float64]
 Tick = Callable[[int, str], None]
-
-DEFAULT_GROUNDS = 6
-"""Default number of grounds."""
 
 INVALID_GROUND = "give 0, or another --posterior: the site is invalid with the values of a ground"
 """Remedy if a ground that was drawn makes the site invalid."""
@@ -175,7 +172,7 @@ def assess(
     seed : int
         Seed of the hypercube. The releases are the first of the verification.
     out : path
-        Folder in which outcomes are kept until `forget` is called.
+        Folder in which outcomes are kept until `rigdda.files.remove_unfinished`.
     tick : callable
         Called with the number of grounds so far and a description.
 
@@ -193,7 +190,7 @@ def assess(
     compared = [case for case in done.cases if case is not done.unchecked]
     comparable = {case.name for case in done.comparable}
     layouts = [case.evaluation.layout for case in compared]
-    seeds, events = _seeds(problem, seed), design_events(problem.site)
+    seeds, facts = _seeds(problem, seed), ensemble.of(problem.site, problem.key).facts
     samples = []
     for i, place in enumerate(cube):
         tick(i, f"ground {i + 1} of {grounds}")
@@ -204,15 +201,14 @@ def assess(
         pairs = zip(asked, place.tolist(), strict=True)
         values = {p: v for one, at in pairs for p, v in zip(one.paths, one.at(at), strict=True)}
         cases = tuple(
-            _case(case.name, site, layout, one)._replace(comparable=case.name in comparable)
+            _case(case.name, site, layout, one, facts)._replace(comparable=case.name in comparable)
             for case, layout, one in zip(compared, layouts, found, strict=True)
         )
         chosen = cases[-1].evaluation
-        targets = problem.targets.state(events, chosen.reach, chosen.failure)
-        samples.append(GroundSample(values, cases, found[0].strata, targets))
+        samples.append(GroundSample(values, cases, found[0].strata, problem.state(chosen)))
     source = "plausible range of the library of grounds" if posterior is None else "posterior"
     count = sum(map(len, seeds.values()))
-    return Band(tuple(samples), count, source, events)
+    return Band(tuple(samples), count, source, design_events(problem.site))
 
 
 def _seeds(problem: DesignProblem, seed: int) -> dict[str, Sequence[int]]:
@@ -226,7 +222,9 @@ def _seeds(problem: DesignProblem, seed: int) -> dict[str, Sequence[int]]:
     return dict(found)
 
 
-def _case(name: str, site: Site, layout: Layout, found: SimulatedSite) -> BandLayout:
-    """Return a layout on one ground."""
-    evaluation = judge(site, layout, found.outcomes, {}, {})
+def _case(
+    name: str, site: Site, layout: Layout, found: SimulatedSite, facts: Mapping[str, Facts]
+) -> BandLayout:
+    """Return a layout on one ground; `facts` are those of the site of the design."""
+    evaluation = judge(site, layout, found.outcomes, facts, {})
     return BandLayout(name, evaluation, price(site, layout, found))

@@ -482,8 +482,8 @@ def run(plan: SensitivityPlan, out: Path | None, tick: Tick) -> Sensitivity:
     plan : SensitivityPlan
         The analysis.
     out : path, optional
-        Folder in which outcomes are kept until `forget` is called. An analysis that was killed
-        continues from there.
+        Folder in which outcomes are kept until `rigdda.files.remove_unfinished`, so that an
+        analysis that was killed continues from there.
     tick : callable
         Called with the number of releases so far and a description.
 

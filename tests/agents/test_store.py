@@ -147,3 +147,14 @@ def test_a_store_keeps_outcomes_exactly(problem: DesignProblem, tmp_path: Path) 
     assert (more.simulated, more.resumed) == (12, 0)
     with pytest.raises(ValueError, match="damaged"):
         unpack(b"not packed")
+
+
+def test_a_layout_asked_for_twice_does_not_shift_the_others(problem: DesignProblem) -> None:
+    other = (Fence(FENCE[0].x + 1.0, 2.0, energy_class=250),)
+    asks = [(problem, FENCE, range(8)), (problem, FENCE, range(8)), (problem, other, range(8))]
+    found = list(Store().evaluate_many(asks))
+    assert found[0] == found[1]
+    assert found[2].objective == problem.evaluate(other, range(8)).objective
+    assert not found[0].outcomes
+    kept = list(Store(outcomes=True).evaluate_many(asks))
+    assert kept[2].outcomes == problem.evaluate(other, range(8)).outcomes

@@ -609,3 +609,44 @@ def test_the_numbers_of_targets_are_written() -> None:
     assert risk is not None
     columns = corridor_report.risk_columns(busy.nothing, busy.site)
     assert (columns["individual"], columns["individual_high"]) == risk.individual[::2]
+
+
+def test_an_option_is_judged_on_all_its_releases_together() -> None:
+    """Twelve batches of 25 releases without a loss are as good as 300 releases, not as 87."""
+    problem = DesignProblem("quick", targets={"reach": 0.5})
+    layout = (Fence(problem.zone.start + 2.0, 4.0, energy_class=3000),)
+    whole = problem.evaluate(layout, range(96))
+    option = planning.Option(layout, 0.0, 0.0)
+    for first in range(0, 96, 24):
+        option.add(problem, whole.outcomes[first : first + 24])
+    assert option.known is not None
+    assert option.releases == 96 and option.value().value == pytest.approx(whole.objective)
+    assert option.value().interval == pytest.approx(whole.ci)
+    assert option.known.reach == whole.reach and option.known.failure == whole.failure
+
+
+def test_fronts_belong_to_the_checks_and_the_targets(site: Site, tmp_path: Path) -> None:
+    files = set()
+    for checks, reach in (("reported", None), ("required", None), ("reported", 0.2)):
+        corridor = Corridor("one", (CorridorSection(site, 40.0, "km 0", reach=reach),), (1e5,))
+        planner = planning.Planner(CorridorProblem(corridor, checks=checks), 200, folder=tmp_path)
+        planner._search()
+        files |= set(tmp_path.glob("front-*.json"))
+        assert all(planner.problem.problems[0].fits(own.layout) for own in planner.fronts[0])
+    assert len(files) == 3
+
+
+def test_errors_of_sections_of_one_site_add_up() -> None:
+    """The statistics without barriers of one site are the same for all its sections."""
+    site = Site.load("quick")
+    sections = tuple(CorridorSection(site, 100.0, f"km {i}") for i in range(9))
+    nine = CorridorProblem(Corridor("nine", sections, (1e5,)))
+    one = CorridorProblem(Corridor("one", sections[:1], (1e5,)))
+    wide, narrow = (p.judge([q.nothing for q in p.problems]) for p in (nine, one))
+    assert wide.objective == pytest.approx(9.0 * narrow.objective)
+    assert np.ptp(wide.ci) == pytest.approx(9.0 * np.ptp(narrow.ci))
+    layout = (Ditch(site.slope.toe, 1.0, 3.0),)
+    parts = [nine.problems[0].evaluate(layout, range(100 * i, 100 * i + 60)) for i in range(9)]
+    apart = nine.judge(parts)
+    sides = [length * np.ptp(e.ci) for length, e in zip(nine.lengths, parts, strict=True)]
+    assert np.ptp(apart.ci) < 0.6 * sum(sides)  # other releases are independent

@@ -247,3 +247,18 @@ def test_a_killed_fit_goes_on_and_its_posterior_is_sampled(tmp_path: Path) -> No
     }  # fmt: skip
     drawn = {float(row[PATHS[0]]) for row in rows(tmp_path / "s/samples.csv")}
     assert drawn <= set(joint.values[:, 0].tolist())
+
+
+def test_values_read_back_belong_to_their_observations(tmp_path: Path) -> None:
+    """A deposit before run-outs: the values are computed in another order."""
+    one = deposit(SITE, 5000, 30)
+    stops = passages(SITE, (), [(s, "block") for s in range(900, 930)], ()).stops["x"]
+    runs = DataSet(OBSERVED_RUN_OUT, "block", np.array(stops, dtype=np.float64))
+    sets = {one.name: one, runs.name: runs}
+    parameters = [parse(PATHS[0])]
+    quiet = lambda done, words: None  # noqa: E731
+    fits = [fit.fit(SITE, sets, parameters, 8, 20, 3, quiet, out=out) for out in (None, tmp_path)]
+    again = fit.fit(SITE, sets, parameters, 8, 20, 3, quiet, out=tmp_path)
+    for other in (fits[1], again):
+        assert other.best.values == fits[0].best.values
+        assert fit.rows(other, other.observed) == fit.rows(fits[0], fits[0].observed)

@@ -402,3 +402,17 @@ def test_intervals_hold_the_quantiles_of_many_releases(event: str) -> None:
         widths.append((one.high - one.low) / true)
     assert held >= 90
     assert np.median(widths) < 1.5  # intervals are not wider than this number of releases requires
+
+
+def test_the_run_out_of_an_event_that_is_switched_off_is_told() -> None:
+    site = Site.load("quick")
+    off = tuple(
+        msgspec.structs.replace(e, rate=0.0) if e.name == "block" else e for e in site.events
+    )
+    found = passages(site, (), [(seed, "block") for seed in range(20)], [])
+    table, without = (
+        stations.run_out(Passing.of(one, (), "block", found))
+        for one in (site, msgspec.structs.replace(site, events=off))
+    )
+    assert [row["probability"] for row in without] == [row["probability"] for row in table]
+    assert {row["rate"] for row in without} == {0.0} and table[0]["probability"] == 1.0

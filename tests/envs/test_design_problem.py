@@ -23,9 +23,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigdda import BadInput, Ditch, Fence, Outcome, Site, Wall
-from rigdda.envs import compare, ensemble, site_store
+from rigdda.envs import compare, design_envelope, ensemble, site_store
+from rigdda.envs import cost as costs
+from rigdda.envs.cost import judge
 from rigdda.envs.outcome_cache import Memory
 from rigdda.envs.problem import DesignProblem, Targets, events_of_seeds
+from rigdda.ground.barrier_zone import BarrierZone
+from rigdda.model.traffic import Traffic
 
 EVENTS = ("small", "block", "low", "group")
 FENCE = (Fence(12.0, 2.0, energy_class=250),)
@@ -506,3 +510,49 @@ def test_problems_and_evaluations_compare_by_what_they_say(
 def test_a_zone_of_no_length_is_refused() -> None:
     with pytest.raises(BadInput, match="the first less than the second"):
         DesignProblem("quick", zone=(25.0, 25.0))
+
+
+def test_without_barriers_rare_harm_has_an_interval(site: Site) -> None:
+    """An event of which no release reaches the road may still do harm."""
+    nothing = DesignProblem(site).nothing
+    harmless = [name for name, chance in nothing.reach.items() if chance.count == 0]
+    outcomes = [cases.outcome(name) for name in site.event_names for _ in range(50)]
+    facts = ensemble.statistics(site, outcomes, dict.fromkeys(site.event_names, 1.0))
+    found = judge(site, (), outcomes, facts, {})
+    assert found.harm == 0.0 and found.harm_ci[1] > 0.0
+    alone = judge(site, (), outcomes, {}, {})
+    assert alone.harm_ci == (0.0, 0.0)
+    assert not harmless or nothing.harm_ci[1] > nothing.harm
+
+
+def test_rare_repair_is_as_wide_as_the_event(site: Site) -> None:
+    wide = msgspec.structs.replace(
+        site,
+        events=tuple(
+            msgspec.structs.replace(e, width=40.0 if e.name == "group" else e.width)
+            for e in site.events
+        ),
+    )
+    facts = DesignProblem(wide)._known.facts
+    price = wide.values(FENCE)[FENCE[0]]
+    largest = costs._largest_repairs(wide, FENCE, facts)
+    assert facts["group"].width == 40.0
+    assert largest["group"] == pytest.approx(40.0 * price)
+    assert largest["small"] == pytest.approx(10.0 * price)
+
+
+def test_demands_exist_up_to_the_ends_of_the_zone() -> None:
+    zone = BarrierZone(4.00049, 17.79951)
+    ends = design_envelope.stations(zone)
+    assert (ends[0], ends[-1]) == (zone.start, zone.end)
+    assert all(b > a for a, b in itertools.pairwise(ends))
+
+
+def test_an_event_without_releases_has_the_risk_without_barriers() -> None:
+    site = msgspec.structs.replace(
+        Site.load("quick"), traffic=Traffic(5000.0, 60.0, 100.0)
+    )
+    problem = DesignProblem(site)
+    found = problem.individual_risk((), {})
+    assert problem.nothing.risk is not None
+    assert found.value == pytest.approx(problem.nothing.risk.individual.value, rel=1e-9)

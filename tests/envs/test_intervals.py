@@ -173,3 +173,8 @@ def test_harm_without_a_block_on_the_road_is_rare_harm() -> None:
     mean = costs._means(own, known, 0.0)[0]
     assert mean.interval == cost(harm, harm > 0.0, known.harm).interval
     assert mean.high > 3.0 * mean.value
+
+
+def test_a_target_of_the_individual_risk_is_never_ignored() -> None:
+    with pytest.raises(AssertionError, match="traffic"):
+        Targets(individual=1e-6).state([], {}, {}, None)

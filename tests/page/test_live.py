@@ -101,3 +101,15 @@ def test_alternatives_are_computed_without_being_opened(live):
         assert live.known(LIGHT, other).costs[name] == live.figures.bare[name]
     assert "500" in live.known(LIGHT, impossible).fault
     assert live.figures.layout == LAYOUT
+
+
+def test_more_releases_after_a_stop_are_computed():
+    release = Release(LIGHT, (), "block")
+    release.more(100_000)
+    release.stop()
+    stopped = release.done
+    release.more(30)
+    release.join()
+    assert not release.running and release.fault == ""
+    assert stopped + 30 <= release.done < 1000
+    assert release.asked == release.done == len(release.falls)

@@ -24,7 +24,7 @@ import numpy as np
 
 from rigdda import BadInput, Layout, Outcome, Site, fields
 from rigdda.agents.designers.frontier import TriedLayout, frontier, worst
-from rigdda.agents.designers.protocol import CHOICE_STREAM, End, of_chance, of_mean
+from rigdda.agents.designers.protocol import CHOICE_STREAM
 from rigdda.app import archive
 from rigdda.app.archive import Archive
 from rigdda.app.barrier_checks import check_layout
@@ -34,9 +34,9 @@ from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.barrier_formulas import BarrierCheck
 from rigdda.envs.cost import account, judge
 from rigdda.envs.ensemble import Ensemble, statistics
-from rigdda.envs.intervals import Estimate, Mean, estimate
+from rigdda.envs.intervals import Estimate, estimate
 from rigdda.envs.outcome_cache import NO_EVENT_MOTION, NO_MOTION
-from rigdda.envs.problem import MISSED, Targets, excess, read_targets
+from rigdda.envs.problem import MISSED, End, Targets, read_targets
 from rigdda.model.site_tables import SECTION
 from rigdda.seeds import is_of_stream
 
@@ -542,34 +542,13 @@ def _candidate(
         killed = {name: costs.toll[costs.event == name, 2].tolist() for name in site.event_names}
         risk = problem.individual_risk(layout, killed)
     ends: tuple[End, ...] = ("upper", "value", "lower")
-    over = [_excess(problem.targets, chances, risk, end) for end in ends]
+    reach, failure = ([pair[which] for pair in chances.values()] for which in range(2))
+    over = [problem.targets.excess(reach, failure, risk, end) for end in ends]
     tried = None
     if chances:
-        reach, failure = (worst(seen) for seen in zip(*chances.values(), strict=True))
-        tried = TriedLayout(layout, site.capital(layout), reach, failure)
+        tried = TriedLayout(layout, site.capital(layout), worst(reach), worst(failure))
     upper = value + ERRORS * math.sqrt(variance)
     return ScoredLayout(layout, outcomes, verified, upper, tried, *over)
-
-
-def _excess(
-    targets: Targets,
-    chances: Mapping[str, tuple[Estimate, Estimate]],
-    risk: Mean | None,
-    end: End,
-) -> float:
-    """Return the largest excess over a target [-]; 0 if there is none.
-
-    It is that of upper bounds, estimates or lower bounds of the probabilities and of the individual
-    risk. A probability without releases counts as 1.
-    """
-    over = [0.0]
-    for which, wanted in enumerate((targets.reach, targets.failure)):
-        if wanted is not None:
-            found = [of_chance(pair[which], end) for pair in chances.values()]
-            over += [(1.0 if math.isnan(value) else value) - wanted for value in found]
-    if risk is not None and targets.individual is not None:
-        over.append(excess(of_mean(risk, end), targets.individual))
-    return max(over)
 
 
 SHORTLIST = 40

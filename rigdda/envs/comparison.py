@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigdda import BadInput, Barrier, Layout, Outcome, Site
 from rigdda.envs import ensemble
 from rigdda.envs.cost import Account, Facts, account
-from rigdda.envs.intervals import Known, Mean, cost, quantile
+from rigdda.envs.intervals import Known, Mean, mean_cost, quantile
 from rigdda.envs.problem import DesignProblem
 
 LEAST_PER_EVENT = 2
@@ -131,7 +131,7 @@ def difference_of_accounts(
             continue
         harm = facts[name].harm
         known = Known(max(rates) * harm.mean, harm.variation)
-        up, down = (cost(np.maximum(part, 0.0), part > 0.0, known) for part in (more, -more))
+        up, down = (mean_cost(np.maximum(part, 0.0), part > 0.0, known) for part in (more, -more))
         both = 2.0 * up.value * down.value * quantile(len(more) - 1) ** 2 / len(more)
         below += _below(up) ** 2 + _above(down) ** 2 + both
         above += _above(up) ** 2 + _below(down) ** 2 + both

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rigdda import BadInput, Layout, Outcome, Site, display
 from rigdda.barriers import describe
-from rigdda.envs.intervals import Estimate, Interval, Known, Mean, cost, estimate, pair, total
+from rigdda.envs.intervals import Estimate, Interval, Known, Mean, estimate, mean_cost, pair, total
 from rigdda.model.traffic import Traffic
 from rigdda.rounding import between
 
@@ -552,9 +552,9 @@ def _means(
 
     Harm can occur without a block on the road if a wall slides onto it.
     """
-    harm = cost(own.harm, own.reached | (own.harm > 0.0), known.harm if known else None)
-    repair = cost(own.repair, own.failed, Known(largest_repair, REPAIR_VARIATION))
-    volume = cost(own.volume, own.reached, known.volume if known else None)
+    harm = mean_cost(own.harm, own.reached | (own.harm > 0.0), known.harm if known else None)
+    repair = mean_cost(own.repair, own.failed, Known(largest_repair, REPAIR_VARIATION))
+    volume = mean_cost(own.volume, own.reached, known.volume if known else None)
     return harm, repair, pair(harm, repair, _correlation(own.harm, own.repair)), volume
 
 
@@ -564,7 +564,7 @@ def toll_means(own: Account, known: Facts | None) -> tuple[Mean, ...]:
         return ()
     before = known.toll if known is not None else (None, None, None)
     pairs = zip(own.toll.T, before, strict=True)
-    return tuple(cost(values, values > 0.0, prior) for values, prior in pairs)
+    return tuple(mean_cost(values, values > 0.0, prior) for values, prior in pairs)
 
 
 def _correlation(one: Floats, two: Floats) -> float:

@@ -166,7 +166,7 @@ def student_interval(values: ArrayLike) -> Interval:
     return mean - half, mean + half
 
 
-def cost(values: ArrayLike, costly: ArrayLike, known: Known | None = None) -> Mean:
+def mean_cost(values: ArrayLike, costly: ArrayLike, known: Known | None = None) -> Mean:
     """Return the mean of costs that are small unless a release is `costly`.
 
     mean = c + p (d - c), where c and d are the mean costs of the cheap and of the costly releases

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -102,6 +103,53 @@ class Targets:
             assert risk is not None, "the target `individual` needs [traffic]"
             states.add(decide_mean(risk.individual, self.individual))
         return next((state for state in (MISSED, UNDECIDED, MET) if state in states), None)
+
+    def excess(
+        self,
+        reach: Iterable[Estimate],
+        failure: Iterable[Estimate],
+        risk: Risk | Mean | None,
+        end: End = "upper",
+    ) -> float:
+        """Return the largest excess over a target [-], 0 if there is none.
+
+        It is that of upper bounds, estimates or lower bounds: of a probability its difference from
+        the target, of the individual risk see `excess`.
+
+        Parameters
+        ----------
+        reach, failure : iterable of Estimate
+            Estimates for the design events. One without releases counts as 1.
+        risk : Risk or Mean or None
+            Risk to the traffic, or the individual risk itself; None only if there is no target
+            `individual`.
+        end : {"upper", "value", "lower"}
+            What is compared.
+        """
+        over = [0.0]
+        for wanted, seen in ((self.reach, reach), (self.failure, failure)):
+            if wanted is not None:
+                over += [of_chance(chance, end) - wanted for chance in seen]
+        if self.individual is not None:
+            assert risk is not None, "the target `individual` needs [traffic]"
+            individual = risk.individual if isinstance(risk, Risk) else risk
+            over.append(excess(of_mean(individual, end), self.individual))
+        return max(over)
+
+
+End = Literal["upper", "value", "lower"]
+"""Upper bound of a number, its estimate, or its lower bound."""
+
+
+def of_chance(chance: Estimate, end: End) -> float:
+    """Return a probability or a one-sided 95 % bound of it; without releases, the estimate is 1."""
+    value = chance.probability if chance.releases else 1.0
+    return {"upper": chance.bound, "value": value, "lower": chance.floor}[end]
+
+
+def of_mean(mean: Mean, end: End) -> float:
+    """Return a mean or an end of its 95 % interval."""
+    return {"upper": mean.high, "value": mean.value, "lower": mean.low}[end]
 
 
 def decide(seen: Estimate, greatest: float) -> str:
@@ -592,27 +640,23 @@ class DesignProblem:
         If Z is 0 both without barriers and for the layout, it is the share of debris kept off the
         road, or 0 if none reaches it without barriers. If only Z without barriers is 0, it is -1.
         If the layout misses a target, it is -1 minus the greatest excess over a target, regardless
-        of cost: of a probability the difference, of the individual risk see `excess`.
+        of cost, see `Targets.excess`. Events without releases do not count.
         """
         if evaluation.targets == MISSED:
-            return -1.0 - self._excess(evaluation)
+            reach, failure = (
+                [seen[name] for name in self._design_events if seen[name].releases]
+                for seen in (evaluation.reach, evaluation.failure)
+            )
+            return -1.0 - self.targets.excess(reach, failure, evaluation.risk, "value")
         return evaluation.gain(self._known.nothing)
 
-    def _excess(self, evaluation: Evaluation) -> float:
-        """Return the greatest excess over a target [-]; events without releases do not count."""
-        over = [
-            seen[name].probability - greatest
-            for greatest, seen in (
-                (self.targets.reach, evaluation.reach),
-                (self.targets.failure, evaluation.failure),
-            )
-            if greatest is not None
-            for name in self._design_events
-            if seen[name].releases
-        ]
-        if self.targets.individual is not None and evaluation.risk is not None:
-            over.append(excess(evaluation.risk.individual.value, self.targets.individual))
-        return max(over)
+    def excess(self, evaluation: Evaluation, end: End = "upper") -> float:
+        """Return the largest excess of an evaluation over a target, see `Targets.excess` [-]."""
+        reach, failure = (
+            [seen[name] for name in self._design_events]
+            for seen in (evaluation.reach, evaluation.failure)
+        )
+        return self.targets.excess(reach, failure, evaluation.risk, end)
 
     @property
     def _design_events(self) -> list[str]:
@@ -649,7 +693,7 @@ class DesignProblem:
                 count = fact.tolled[2]
                 killed = [known.mean] * count + [0.0] * (fact.releases - count)
             own = np.array(killed, dtype=np.float64)
-            mean = intervals.cost(own, own > 0.0, known)
+            mean = intervals.mean_cost(own, own > 0.0, known)
             parts.append(mean.times(site.rate(name, layout)))
         return total(parts).times(site.traffic.section_length * site.traffic.person)
 

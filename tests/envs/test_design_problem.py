@@ -549,9 +549,7 @@ def test_demands_exist_up_to_the_ends_of_the_zone() -> None:
 
 
 def test_an_event_without_releases_has_the_risk_without_barriers() -> None:
-    site = msgspec.structs.replace(
-        Site.load("quick"), traffic=Traffic(5000.0, 60.0, 100.0)
-    )
+    site = msgspec.structs.replace(Site.load("quick"), traffic=Traffic(5000.0, 60.0, 100.0))
     problem = DesignProblem(site)
     found = problem.individual_risk((), {})
     assert problem.nothing.risk is not None

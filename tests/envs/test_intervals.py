@@ -16,8 +16,8 @@ from rigdda.envs.intervals import (
     Estimate,
     Known,
     Mean,
-    cost,
     estimate,
+    mean_cost,
     mid_p,
     pair,
     student_interval,
@@ -105,17 +105,17 @@ def test_students_interval_covers_the_mean_as_often_as_it_says() -> None:
 
 
 def test_a_cost_that_was_not_seen_is_borrowed() -> None:
-    none = cost(np.zeros(300), np.zeros(300, bool), Known(1e4, 0.3))
+    none = mean_cost(np.zeros(300), np.zeros(300, bool), Known(1e4, 0.3))
     assert (none.value, none.low) == (0.0, 0.0)
     assert none.high == pytest.approx(1e4 * mid_p(0, 300)[1])
-    one = cost([8e3, *[0.0] * 299], [True, *[False] * 299], Known(1e4, 0.3))
+    one = mean_cost([8e3, *[0.0] * 299], [True, *[False] * 299], Known(1e4, 0.3))
     assert one.value == pytest.approx(8e3 / 300)
     assert 0.0 <= one.low < one.value < one.high
-    assert cost([], []).interval == (0.0, math.inf)
+    assert mean_cost([], []).interval == (0.0, math.inf)
 
 
 def test_one_release_alone_is_uncertain_by_itself() -> None:
-    found = cost([500.0], [True])
+    found = mean_cost([500.0], [True])
     assert found.low < 250.0
     assert found.high >= 1000.0
 
@@ -152,8 +152,8 @@ def test_costs_are_held_in_90_to_99_percent(names: tuple[str, ...]) -> None:
             factor = np.exp(spread * rng.standard_normal(releases) - 0.5 * spread**2)
             failed = reached & (rng.random(releases) < fails)
             repair = 2.0 * emptying * rng.random(releases) + mend * failed
-            harm = cost(mean * factor * reached, reached, Known(1.2 * mean, variation))
-            both = pair(harm, cost(repair, failed, Known(mend, 0.2)), 0.5)
+            harm = mean_cost(mean * factor * reached, reached, Known(1.2 * mean, variation))
+            both = pair(harm, mean_cost(repair, failed, Known(mend, 0.2)), 0.5)
             parts.append(both)
         found = total(parts)
         held += found.low <= true <= found.high
@@ -171,7 +171,7 @@ def test_harm_without_a_block_on_the_road_is_rare_harm() -> None:
     none, failed = np.zeros(16, dtype=bool), np.eye(1, 16, dtype=bool)[0]
     own = Account(np.full(16, "block"), harm, np.zeros(16), np.zeros(16), none, failed)
     mean = costs._means(own, known, 0.0)[0]
-    assert mean.interval == cost(harm, harm > 0.0, known.harm).interval
+    assert mean.interval == mean_cost(harm, harm > 0.0, known.harm).interval
     assert mean.high > 3.0 * mean.value
 
 

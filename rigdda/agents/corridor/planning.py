@@ -42,7 +42,6 @@ from rigdda.barriers import from_table, to_tables
 from rigdda.envs import CorridorEvaluation, CorridorProblem, DesignProblem, Evaluation
 from rigdda.envs.cost import Account, account
 from rigdda.envs.intervals import Mean
-from rigdda.envs.problem import excess
 from rigdda.files import atomic
 from rigdda.seeds import derive, release_seeds
 
@@ -134,20 +133,13 @@ class Option:
         return (mean.high - mean.low) / (2.0 * DEVIATIONS)
 
     def missed(self, problem: DesignProblem) -> float:
-        """Return the largest excess of an upper bound over its target, see `Targets` [-].
+        """Return the largest excess of an upper bound over its target, see `Targets.excess` [-].
 
         All releases of the layout count, including those that do not affect any choice.
         """
-        over, targets = [0.0], problem.targets
         found = self.overall or self.known
         assert found is not None
-        for event in problem.site.events:
-            if event.design:
-                pairs = (targets.reach, found.reach), (targets.failure, found.failure)
-                over += [seen[event.name].bound - wanted for wanted, seen in pairs if wanted]
-        if targets.individual is not None and found.risk is not None:
-            over.append(excess(found.risk.individual.high, targets.individual))
-        return max(over)
+        return problem.excess(found)
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,8 +27,6 @@ from rigdda.agents.designers.menu import on_bound
 from rigdda.agents.designers.store import Store, StoredEvaluation
 from rigdda.agents.limits import JOB_RELEASES, SEED
 from rigdda.envs import DesignProblem, Evaluation
-from rigdda.envs.intervals import Estimate, Mean
-from rigdda.envs.problem import excess
 from rigdda.seeds import release_seeds
 
 CHOICE_STREAM = "report"
@@ -49,46 +47,12 @@ def score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, float]
     """
     if evaluation.targets != "missed":
         return 0.0, evaluation.objective
-    return shortfall(problem, evaluation), evaluation.objective
+    return problem.excess(evaluation), evaluation.objective
 
 
 def final_score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, float]:
     """Return the sort key of a layout in finals, where an undecided target counts as missed."""
-    return shortfall(problem, evaluation), evaluation.objective
-
-
-End = Literal["upper", "value", "lower"]
-"""Upper bound of a number, its estimate, or its lower bound."""
-
-
-def of_chance(chance: Estimate, end: End) -> float:
-    """Return a probability or a one-sided 95 % bound of it."""
-    return {"upper": chance.bound, "value": chance.probability, "lower": chance.floor}[end]
-
-
-def of_mean(mean: Mean, end: End) -> float:
-    """Return a mean or an end of its 95 % interval."""
-    return {"upper": mean.high, "value": mean.value, "lower": mean.low}[end]
-
-
-def shortfall(problem: DesignProblem, evaluation: Evaluation, end: End = "upper") -> float:
-    """Return the largest excess over a target [-].
-
-    Targets are those of all design events and of the individual risk, see
-    `rigdda.envs.problem.excess`. The excess is that of upper bounds, estimates or lower bounds.
-    """
-    design = [event.name for event in problem.site.events if event.design]
-    over = [0.0]
-    for wanted, found in (
-        (problem.targets.reach, evaluation.reach),
-        (problem.targets.failure, evaluation.failure),
-    ):
-        if wanted is not None:
-            over += [of_chance(found[name], end) - wanted for name in design]
-    wanted = problem.targets.individual
-    if wanted is not None and evaluation.risk is not None:
-        over.append(excess(of_mean(evaluation.risk.individual, end), wanted))
-    return max(over)
+    return problem.excess(evaluation), evaluation.objective
 
 
 def best_of_finals(problem: DesignProblem, evaluations: Sequence[Evaluation]) -> Evaluation:
@@ -101,10 +65,10 @@ def best_of_finals(problem: DesignProblem, evaluations: Sequence[Evaluation]) ->
     their excesses are not above the upper bound of the excess of the first.
     """
     first = min(evaluations, key=lambda e: final_score(problem, e))
-    if any(shortfall(problem, e, "value") <= 0.0 for e in evaluations):
+    if any(problem.excess(e, "value") <= 0.0 for e in evaluations):
         return first
-    most = shortfall(problem, first)
-    alike = [e for e in evaluations if shortfall(problem, e, "lower") <= most]
+    most = problem.excess(first)
+    alike = [e for e in evaluations if problem.excess(e, "lower") <= most]
     return min(alike, key=lambda e: e.objective)
 
 

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import Fence, Layout
-from rigdda.agents.designers.protocol import End, Ledger, of_mean
+from rigdda.agents.designers.protocol import Ledger
 from rigdda.agents.designers.store import Release
 from rigdda.envs import DesignProblem
 from rigdda.envs.intervals import CONFIDENCE, lower_bound, upper_bound
-from rigdda.envs.problem import excess
+from rigdda.envs.problem import End, excess, of_mean
 
 Floats = NDArray[np.float64]
 

@@ -42,8 +42,8 @@ class LayoutChecks:
 
     @property
     def satisfied(self) -> bool:
-        """Whether all checks are met."""
-        return not self.failed
+        """Whether all checks of new barriers are met."""
+        return all(check.existing for check in self.failed)
 
 
 def check_layout(problem: DesignProblem, layout: Layout, seed: int = 0) -> LayoutChecks:
@@ -72,7 +72,8 @@ def check_layout(problem: DesignProblem, layout: Layout, seed: int = 0) -> Layou
     table: list[BarrierCheck] = []
     idle: list[str] = []
     for i, barrier in enumerate(built):
-        label = barrier.label if barrier in own else f"existing {barrier.label}"
+        existing = barrier not in own
+        label = f"existing {barrier.label}" if existing else barrier.label
         demand = None
         if not isinstance(barrier, Ditch):
             zone = including(problem.zone, barrier)
@@ -82,7 +83,10 @@ def check_layout(problem: DesignProblem, layout: Layout, seed: int = 0) -> Layou
                 idle.append(f"{label}, at {barrier.x:.1f} m")
         if demand is not None and isinstance(barrier, Fence):
             fences.append(FenceCheck.of(site, barrier, demand))
-        table += [c._replace(barrier=label) for c in checks_of(site, barrier, demand)]
+        table += [
+            check._replace(barrier=label, existing=existing)
+            for check in checks_of(site, barrier, demand)
+        ]
     return LayoutChecks(tuple(fences), tuple(table), tuple(idle))
 
 

@@ -31,7 +31,6 @@ from rigdda.app.design_study import (
     WITHOUT_CHECKS,
     DesignStudy,
     VerifiedLayout,
-    design_events,
 )
 from rigdda.app.interim_answer import InterimAnswer, Tell
 from rigdda.app.remaining_risk import remaining_risk
@@ -40,7 +39,8 @@ from rigdda.app.simulate import Tick
 from rigdda.app.verification import Verification
 from rigdda.app.verified_frontier import with_frontier
 from rigdda.envs import DesignProblem, Evaluation
-from rigdda.envs.problem import MISSED
+from rigdda.envs.comparison import same_structures
+from rigdda.envs.problem import MISSED, UNDECIDED
 
 
 def design(
@@ -57,8 +57,9 @@ def design(
     """Design a layout, then verify it and the layouts for comparison on new releases.
 
     If the layout misses a target, the layouts of the frontier are verified as well, see
-    `with_verified_frontier`, and the best of all verified layouts is chosen. The chosen layout is
-    then verified on other releases than those of this choice.
+    `with_verified_frontier`, and the best of all verified layouts is chosen. If it is undecided
+    whether the layout meets the targets and a layout for comparison meets them, the best of these
+    is chosen. The chosen layout is then verified on other releases than those of this choice.
 
     `evaluations.csv` and the store `evaluations.jsonl` are written into `out` during the search,
     and the archive of all outcomes at the end. A study that was interrupted reads the evaluations
@@ -124,8 +125,8 @@ def design(
         front: tuple[TriedLayout, ...] = ()
         replaced = False
         done = begun + releases * len(cases)
-        if cases[-1].evaluation.targets == MISSED and design_events(problem.site):
-            tick(done, "verifying the frontier")
+        if cases[-1].evaluation.targets in (MISSED, UNDECIDED):
+            tick(done, "verifying other layouts for the targets")
             searched = name not in SEARCHLESS
             result, front, replaced = with_frontier(problem, result, cases, check, searched)
     tick(done, "analysing the remaining risk, checking barriers")
@@ -277,6 +278,6 @@ def _found(
     """Return the layout that was found without required checks, if it differs, and the result."""
     words = {"rule": rule.name, CONSTANT: CONSTANT}.get(name, f"optimised ({name})")
     found = [(words, result.layout)]
-    if unchecked is not None and unchecked.layout != result.layout:
+    if unchecked is not None and not same_structures(result.site, unchecked.layout, result.layout):
         found.insert(0, (WITHOUT_CHECKS, unchecked.layout))
     return found

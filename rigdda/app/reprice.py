@@ -447,9 +447,7 @@ def failed_checks(
     if layout == archive.layout_of(kept.layouts[-1]):
         # the new cap does not apply here
         free = DesignProblem(problem.site, kept.max_barriers, kept.kinds, zone=kept.zone)
-        own = standing(layout)
-        checks = check_layout(free, layout).failed
-        return tuple(c for c in checks if any(c.barrier == b.label and c.x == b.x for b in own))
+        return tuple(check for check in check_layout(free, layout).failed if not check.existing)
     return tuple(
         check for barrier in standing(layout) for check in problem.place.failed_checks(barrier)
     )
@@ -565,13 +563,15 @@ def choose(
     chosen only because its few releases happen to be favourable.
 
     If none meets the targets, the choice is among the verified layouts with barriers, or among all
-    if there are none. It is the one that misses the targets least. If the probabilities of none of
+    if there are none. Those that are shown to miss a target rank behind all others. Of the rest, it
+    is the one that misses the targets least. If the probabilities of none of
     them are within the targets, others that are not shown to miss them by more and have at least
     half as many releases compete with it by Z, see `protocol.best_of_finals`.
     """
     field = [c for c in candidates if c.over <= 0.0]
     if not field:
         may = [c for c in candidates if c.verified and c.layout] or candidates
+        may = [c for c in may if c.least <= 0.0] or may
         first = min(may, key=lambda c: (c.over, c.upper))
         enough = 0.5 * len(first.outcomes)
         field = [c for c in may if c.least <= first.over and len(c.outcomes) >= enough]

@@ -13,10 +13,9 @@ from rigdda.agents.designers.protocol import (
     DesignResult,
     best_of_finals,
 )
-from rigdda.app.design_study import (
-    VerifiedLayout,
-)
+from rigdda.app.design_study import VerifiedLayout, design_events
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.problem import MET, MISSED
 
 MOST_VERIFIED = 8
 """Largest number of layouts of a frontier that are verified in addition to the others."""
@@ -34,10 +33,12 @@ def with_frontier(
     check: Check,
     searched: bool,
 ) -> tuple[DesignResult, tuple[TriedLayout, ...], bool]:
-    """Return a result that misses a target with its verified frontier.
+    """Return a result that misses a target, or may miss it, with its verified frontier.
 
     If the layout was `searched` for, the best of all verified layouts takes its place in the result
-    and in the last of the cases. It is verified on other releases than those of this choice.
+    and in the last of the cases. It is verified on other releases than those of this choice. There
+    is a frontier only if the layout misses a target and the site has design events. A layout that
+    may miss a target is replaced only by one that meets it.
 
     Returns
     -------
@@ -49,11 +50,17 @@ def with_frontier(
         Whether the layout of the result was replaced.
     """
     judged = cache(lambda layout: check(layout, "frontier"))
-    known = with_verified_frontier(problem, result.tried, cases, judged)
-    result, front = replace(result, tried=known), frontier(known)
+    fitting = [c.evaluation for c in cases[:-1] if problem.fits(c.evaluation.layout)]
+    front: tuple[TriedLayout, ...] = ()
+    if cases[-1].evaluation.targets != MISSED:
+        fitting = [e for e in fitting if e.targets == MET]
+        searched = searched and bool(fitting)
+    elif design_events(problem.site):
+        known = with_verified_frontier(problem, result.tried, cases, judged)
+        result, front = replace(result, tried=known), frontier(known)
     if not searched:
         return result, front, False
-    layouts = [c.evaluation.layout for c in cases[:-1] if problem.fits(c.evaluation.layout)]
+    layouts = [evaluation.layout for evaluation in fitting]
     layouts += [one.layout for one in front if one.verified is not None]
     layouts.append(cases[-1].evaluation.layout)
     seen = [judged(layout) for layout in dict.fromkeys(layouts)]

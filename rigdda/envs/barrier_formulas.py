@@ -56,6 +56,8 @@ class BarrierCheck(NamedTuple):
         Largest acceptable utilisation [-].
     note : str
         Event, load or doubt.
+    existing : bool
+        Whether the barrier stands already.
     """
 
     barrier: str
@@ -66,6 +68,7 @@ class BarrierCheck(NamedTuple):
     unit: str
     limit: float
     note: str
+    existing: bool = False
 
     @property
     def use(self) -> float:

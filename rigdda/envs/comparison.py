@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigdda import BadInput, Barrier, Layout, Outcome, Site
+from rigdda import BadInput, Barrier, Layout, Mesh, Outcome, Site
 from rigdda.envs import ensemble
 from rigdda.envs.cost import Account, Facts, account
 from rigdda.envs.intervals import Known, Mean, mean_cost, quantile
@@ -114,6 +114,7 @@ def difference_of_accounts(
     """
     one, two = accounts
     value = site.annual(layouts[0]) - site.annual(layouts[1])
+    same = same_structures(site, *layouts)
     below, above, differ = 0.0, 0.0, 0
     for name in site.event_names:
         rates = [site.rate(name, layout) for layout in layouts]
@@ -127,7 +128,7 @@ def difference_of_accounts(
         more = rates[0] * _spent(one)[own] - rates[1] * _spent(two)[own]
         differ += int(np.count_nonzero(more))
         value += float(more.mean())
-        if layouts[0] == layouts[1]:
+        if same:
             continue
         harm = facts[name].harm
         known = Known(max(rates) * harm.mean, harm.variation)
@@ -137,6 +138,15 @@ def difference_of_accounts(
         above += _above(up) ** 2 + _below(down) ** 2 + both
     ends = value - math.sqrt(below), value + math.sqrt(above)
     return Difference(value, ends, len(one.event), differ)
+
+
+def same_structures(site: Site, one: Layout, two: Layout) -> bool:
+    """Return whether two layouts leave the same barriers and meshes on a site.
+
+    An existing barrier may be removed by a removal or by the barrier that replaces it.
+    """
+    meshes = [sorted(b.option for b in layout if isinstance(b, Mesh)) for layout in (one, two)]
+    return meshes[0] == meshes[1] and set(site.standing(one)) == set(site.standing(two))
 
 
 def _below(mean: Mean) -> float:

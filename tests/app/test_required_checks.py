@@ -113,7 +113,6 @@ def answer(**values: object) -> DesignAnswer:
 
 ENERGY = FailedCheck("fence 1,000 kJ, at 9.0 m", "energy", 1.26)
 HEIGHT = FailedCheck("fence 1,000 kJ, at 9.0 m", "height", 4.0)
-OLD = FailedCheck("existing wall, at 3.0 m", "sliding, impact", 100.0)
 DEAR = (130.0, 120.0, 140.0)
 
 
@@ -122,10 +121,10 @@ DEAR = (130.0, 120.0, 140.0)
     [
         ({}, "Build: ditch at x = 9."),
         ({"targets": "met"}, "Build: ditch at x = 9."),
-        ({"failed": (OLD,)}, "Build: ditch at x = 9."),
         ({"layout": ""}, "Build nothing: no layout was found that meets every check and is worth "),
         ({"layout": "", "required": False}, "Build nothing: no layout was found that is worth"),
         ({"layout": "", "targets": "met"}, "Build nothing: the slope without barriers meets"),
+        ({"layout": "", "targets": "undecided"}, "Verify with more releases: no layout was found"),
         ({"layout": "", "targets": "missed"}, "No layout that was found meets the target that"),
         ({"targets": "missed"}, "No layout that was found meets the target that rock arrives"),
         ({"targets": "missed", "failed": (ENERGY,)}, "No layout that was found meets the target"),

@@ -27,6 +27,7 @@ from rigdda.agents.designers.menu import on_bound
 from rigdda.agents.designers.store import Store, StoredEvaluation
 from rigdda.agents.limits import JOB_RELEASES, SEED
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.envs.problem import MISSED
 from rigdda.seeds import release_seeds
 
 CHOICE_STREAM = "report"
@@ -45,7 +46,7 @@ def score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, float]
     The amount is the excess of the upper bound over the target. It is 0 if the targets are met or
     undecided.
     """
-    if evaluation.targets != "missed":
+    if evaluation.targets != MISSED:
         return 0.0, evaluation.objective
     return problem.excess(evaluation), evaluation.objective
 
@@ -58,12 +59,14 @@ def final_score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, 
 def best_of_finals(problem: DesignProblem, evaluations: Sequence[Evaluation]) -> Evaluation:
     """Return the best of some evaluations with many releases each.
 
-    It is the first by `final_score` if the probabilities of any layout are within the targets. If
-    all layouts miss a target, differences in the excess may be due to chance, and a layout that
-    costs a multiple should not be preferred because of them. Then it is the layout with the lowest
-    Z among those that are not shown to miss the targets by more than the first: the lower bounds of
-    their excesses are not above the upper bound of the excess of the first.
+    Layouts that are shown to miss a target rank behind all others. Of the rest, it is the first by
+    `final_score` if the probabilities of any layout are within the targets. If none are,
+    differences in the excess may be due to chance, and a layout that costs a multiple should not be
+    preferred because of them. Then it is the layout with the lowest Z among those that are not
+    shown to miss the targets by more than the first: the lower bounds of their excesses are not
+    above the upper bound of the excess of the first.
     """
+    evaluations = [e for e in evaluations if e.targets != MISSED] or evaluations
     first = min(evaluations, key=lambda e: final_score(problem, e))
     if any(problem.excess(e, "value") <= 0.0 for e in evaluations):
         return first

@@ -167,6 +167,7 @@ def best_of_ends(ends: Sequence[Arm]) -> Arm:
     ends : sequence of Arm
         The arms, by their keys.
     """
+    ends = [arm for arm in ends if arm.excess("lower") <= 0.0] or ends
     if any(arm.excess("value") <= 0.0 for arm in ends):
         return ends[0]
     most = ends[0].shortfall()

@@ -58,7 +58,7 @@ class DesignAnswer(NamedTuple):
     required : bool
         Whether all checks had to be met.
     failed : sequence of FailedCheck
-        Checks that the layout does not meet.
+        Checks that its new barriers do not meet.
     reaching : (str, float)
         The design event that most often reaches the road with the layout, empty without design
         events, and the share of its releases that do [-].
@@ -84,14 +84,20 @@ def headline(answer: DesignAnswer) -> str:
     A layout is never headed "build" if it fails one of its checks, misses a target, or costs more
     than it saves without being needed for a target.
     """
-    layout, own = answer.layout, [f for f in answer.failed if not is_existing(f)]
-    fails = f" It fails its checks: {failed_words(own)}." if own else ""
+    layout = answer.layout
+    fails = f" It fails its checks: {failed_words(answer.failed)}." if answer.failed else ""
     if answer.targets == MISSED:
         if not layout:
             return f"No layout that was found meets the target that {answer.asked}."
         return (
             f"No layout that was found meets the target that {answer.asked}. "
             f"The best of those that miss it: {layout}.{fails}"
+        )
+    if not layout and answer.targets == UNDECIDED:
+        return (
+            f"Verify with more releases: no layout was found that meets the target that "
+            f"{answer.asked}, and these releases do not decide whether the slope {answer.bare} "
+            "meets it."
         )
     if not layout:
         worth = "meets every check and is worth" if answer.required else "is worth"
@@ -144,11 +150,6 @@ def failed_words(failed: Sequence[FailedCheck]) -> str:
         uses = " and ".join(f"{one.check} {_times(one.use)}" for one in group)
         words.append(f"{barrier}: {uses} times the limit")
     return "; ".join(words)
-
-
-def is_existing(failed: FailedCheck) -> bool:
-    """Return whether a check is that of a barrier that stands already."""
-    return failed.barrier.startswith("existing ")
 
 
 def _times(use: float) -> str:
@@ -313,7 +314,7 @@ def over_the_cap(problem: DesignProblem, cases: Sequence[tuple[str, Evaluation]]
 def frontier(
     done: ComparedLayouts, front: Sequence[TriedLayout], tried: int, replaced: bool
 ) -> list[str]:
-    """Return lines on the frontier of a missed target; empty if there is no frontier.
+    """Return lines on the frontier of a missed target, and on a layout that was replaced.
 
     Parameters
     ----------
@@ -326,8 +327,13 @@ def frontier(
     replaced : bool
         Whether the layout of the search was replaced by one of the frontier.
     """
+    chosen = (
+        f"{done.chosen.name!r} was chosen instead of the layout of the search, because it meets "
+        "the targets, misses them by less or has a lower annual cost; it was verified again on "
+        "other releases"
+    )
     if not front:
-        return []
+        return [chosen] if replaced else []
     known = sum(one.verified is not None for one in front)
     words = "all of these layouts were verified"
     if known < len(front):
@@ -344,13 +350,7 @@ def frontier(
         f"the lowest upper bound of P(reach) is {at_most(least.level)}, for {euros(least.cost)} "
         "EUR per metre to build",
     ]
-    if replaced:
-        lines.append(
-            f"{done.chosen.name!r} was chosen instead of the layout of the search, because it "
-            "misses the targets by less or has a lower annual cost; it was verified again on other "
-            "releases"
-        )
-    return lines
+    return [*lines, chosen] if replaced else lines
 
 
 def _what_missed(done: ComparedLayouts, replaced: bool) -> str:
@@ -438,8 +438,8 @@ def compared_only(layouts: Sequence[str]) -> list[str]:
 
 
 def failed_checks(checks: LayoutChecks) -> list[FailedCheck]:
-    """Return the checks of a layout that are not met, for a headline."""
-    return in_words(checks.failed)
+    """Return the checks that new barriers of a layout do not meet, for a headline."""
+    return in_words([check for check in checks.failed if not check.existing])
 
 
 def in_words(failed: Sequence[BarrierCheck]) -> list[FailedCheck]:

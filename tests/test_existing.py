@@ -19,9 +19,13 @@ from rigdda.app.reports import findings
 from rigdda.app.reports.wording import before, order, unchanged
 from rigdda.app.site_check import facts
 from rigdda.app.site_oddities import oddities
+from rigdda.app.uncertainty.parameters import plausible
 from rigdda.barriers import Removal
 from rigdda.barriers.fence import WornFence
 from rigdda.envs import DesignProblem
+from rigdda.envs.comparison import difference_of_accounts, same_structures
+from rigdda.envs.cost import Account, Facts
+from rigdda.envs.intervals import Known
 from rigdda.envs.rendering import picture
 from rigdda.envs.repetition import repeat
 from rigdda.envs.replay_record import ReleaseRecord, release_record
@@ -254,3 +258,34 @@ def test_an_environment_takes_sites_with_and_without_it(site: Site) -> None:
     assert slots.kinds[-1] == "removal"
     assert "removal" not in slots.shared(LIGHT)
     assert slots.shared(site) == slots.kinds
+
+
+def test_a_removal_and_a_replacement_in_its_place_are_the_same_structures() -> None:
+    site = Site.load("old-fence")
+    old = site.existing_barriers[0]
+    assert site.existing[0].removable
+    new = Fence(old.x, 4.0, energy_class=1000)
+    one, two = (new,), (Removal(old.x), new)
+    assert same_structures(site, one, one) and not same_structures(site, one, ())
+    assert same_structures(site, one, two)
+    assert not same_structures(site, one, (Removal(old.x),))
+    names = site.event_names
+    count = 5 * len(names)
+    parts = Account(
+        np.repeat(names, 5),
+        np.arange(count, dtype=float),
+        *np.zeros((2, count)),
+        *np.zeros((2, count), dtype=bool),
+    )
+    facts = {name: Facts(9, 0, Known(1e6, 1.0), Known(1.0, 1.0), 1.0, 1.0) for name in names}
+    found = difference_of_accounts(site, (one, two), (parts, parts), facts)
+    assert found.value == pytest.approx(0.0, abs=1e-9) and found.differ == 0
+    assert np.ptp(found.ci) == 0.0
+
+
+def test_the_sensitivity_counts_the_money_of_what_stands() -> None:
+    site = Site.load("old-fence")
+    assert "prices.level" in {one.path for one in plausible(site, ())["prices"]}
+    assert "prices.interest" not in {one.path for one in plausible(site, ())["prices"]}
+    bare = {one.path for one in plausible(msgspec.structs.replace(site, existing=()), ())["prices"]}
+    assert "prices.level" not in bare

@@ -17,6 +17,7 @@ import msgspec
 
 from rigdda import MECHANICS, BadInput, Layout, Outcome, Site, __version__
 from rigdda.agents.designers.store import Store
+from rigdda.app.value_origins import Mark
 from rigdda.barriers import from_table, to_tables
 from rigdda.envs import DesignProblem, ensemble
 from rigdda.envs.ensemble import Ensemble
@@ -71,6 +72,8 @@ class Archive(msgspec.Struct, frozen=True):
         Outcomes of the releases without barriers from which the statistics of the site follow.
     releases : list of ArchivedReleases
         All other releases, each layout once.
+    placeholders : list of Mark
+        Values of the site file that were marked as placeholders.
     """
 
     version: str
@@ -89,6 +92,7 @@ class Archive(msgspec.Struct, frozen=True):
     blocks: dict[str, float]
     bare: list[Outcome]
     releases: list[ArchivedReleases]
+    placeholders: list[Mark] = []
 
 
 class LayoutReleases(NamedTuple):
@@ -100,7 +104,11 @@ class LayoutReleases(NamedTuple):
 
 
 def archive(
-    problem: DesignProblem, seed: int, cases: Sequence[tuple[str, Layout]], store: Store
+    problem: DesignProblem,
+    seed: int,
+    cases: Sequence[tuple[str, Layout]],
+    store: Store,
+    placeholders: Sequence[Mark] = (),
 ) -> Archive:
     """Return the archive of a design.
 
@@ -114,6 +122,8 @@ def archive(
         The verified layouts, no barrier first and the layout found last.
     store : Store
         The store of the design, which keeps the outcomes.
+    placeholders : sequence of Mark
+        Values of the site file that are marked as placeholders.
     """
     known = ensemble.of(problem.site, problem.key)
     return Archive(
@@ -136,6 +146,7 @@ def archive(
             ArchivedReleases(to_tables(own.layout), list(own.seeds), list(own.outcomes))
             for own in gathered(store)
         ],
+        placeholders=list(placeholders),
     )
 
 

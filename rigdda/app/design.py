@@ -36,6 +36,7 @@ from rigdda.app.interim_answer import InterimAnswer, Tell
 from rigdda.app.remaining_risk import remaining_risk
 from rigdda.app.reports.tables import EvaluationsFile
 from rigdda.app.simulate import Tick
+from rigdda.app.value_origins import Mark
 from rigdda.app.verification import Verification
 from rigdda.app.verified_frontier import with_frontier
 from rigdda.envs import DesignProblem, Evaluation
@@ -53,6 +54,7 @@ def design(
     tick: Tick,
     precision: float = 0.0,
     tell: Tell = lambda _: None,
+    placeholders: Sequence[Mark] = (),
 ) -> tuple[DesignStudy, Store]:
     """Design a layout, then verify it and the layouts for comparison on new releases.
 
@@ -87,6 +89,8 @@ def design(
     tell : callable
         Called with the layouts that are known so far, the best one last. The first call comes
         within seconds.
+    placeholders : sequence of Mark
+        Values of the site file that are marked as placeholders, for the archive.
 
     Raises
     ------
@@ -131,7 +135,8 @@ def design(
             result, front, replaced = with_frontier(problem, result, cases, check, searched)
     tick(done, "analysing the remaining risk, checking barriers")
     named = [(case.name, case.evaluation.layout) for case in cases]
-    archive.write(out / archive.ARCHIVE_FILE, archive.archive(problem, seed, named, store))
+    kept = archive.archive(problem, seed, named, store, placeholders)
+    archive.write(out / archive.ARCHIVE_FILE, kept)
     found = _concluded(problem, cases, result, rule, verification, seed)
     return replace(found, frontier=front, replaced=replaced), store
 

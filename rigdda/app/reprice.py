@@ -29,6 +29,7 @@ from rigdda.app import archive
 from rigdda.app.archive import Archive
 from rigdda.app.barrier_checks import check_layout
 from rigdda.app.design_study import ComparedLayouts, VerifiedLayout
+from rigdda.app.value_origins import Mark
 from rigdda.barriers import standing
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.barrier_formulas import BarrierCheck
@@ -339,6 +340,8 @@ class Repriced(ComparedLayouts):
         Whether the design required that every barrier meets its checks.
     failed : dict of str to tuple of BarrierCheck
         Checks that the barriers of each case do not meet, by its name.
+    placeholders : tuple of Mark
+        Values of the site file that are marked as placeholders and were not changed.
     """
 
     changes: tuple[Change, ...]
@@ -347,6 +350,7 @@ class Repriced(ComparedLayouts):
     frontier: tuple[TriedLayout, ...]
     required: bool
     failed: dict[str, tuple[BarrierCheck, ...]]
+    placeholders: tuple[Mark, ...]
 
     @property
     def comparable(self) -> tuple[VerifiedLayout, ...]:
@@ -418,8 +422,22 @@ def reprice(
         tried=len(candidates),
         frontier=front,
         required=required,
+        placeholders=_without(kept.placeholders, site, settings or {}),
         failed={case.name: failed[case.evaluation.layout] for case in cases},
     )
+
+
+def _without(marked: Sequence[Mark], site: Site, settings: Mapping[str, Value]) -> tuple[Mark, ...]:
+    """Return the placeholders of a site file that are not among some settings."""
+    given = set()
+    for path, value in settings.items():
+        top, place = path.partition(".")[0], 0
+        table, _, key = path.rpartition(".")
+        if isinstance(getattr(site, top), tuple):
+            place, keys = _named(site, path, value, top)
+            table, key = top, keys[0]
+        given.add(Mark(table, place, key))
+    return tuple(mark for mark in marked if mark not in given)
 
 
 def failed_checks(

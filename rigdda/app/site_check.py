@@ -6,7 +6,6 @@ import math
 import os
 import time
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -79,14 +78,19 @@ def _forests(site: Site) -> Iterator[str]:
     """Yield what stands in each forest, and how often it is struck."""
     size = max(event.block_size(site.source(event.source)) for event in site.events)
     for one in site.forest:
-        energy = most_energy(np.array([one.dbh]), np.array([one.conifers >= 0.5]))[0]
+        kinds = [one.conifers > 0.0, one.conifers < 1.0]
+        words = [
+            f"{1e-3 * most_energy(np.array([one.dbh]), np.array([is_conifer]))[0]:.3g} kJ ({kind})"
+            for kind, is_conifer in (("conifer", True), ("broadleaved tree", False))
+            if kinds[0 if is_conifer else 1]
+        ]
         often = one.struck(size)
         yield (
             f"forest at x = {chainage(one.start)} to {chainage(one.end)} m: {one.stems:g} stems a "
             f"hectare of {one.dbh:g} m, a basal area of {one.basal_area:.3g} m2 a hectare; a block "
             f"{size:.2g} m wide strikes one "
             + (f"in every {1.0 / often:.3g} m" if often > 0.0 else "never")
-            + f", which takes at most {1e-3 * energy:.3g} kJ if it is of the mean diameter"
+            + f", which takes at most {' or '.join(words)} if it is of the mean diameter"
         )
 
 
@@ -113,10 +117,7 @@ def _standing(site: Site) -> Iterator[str]:
 
 def placeholders(path: str) -> list[str]:
     """Return the values that a file of `rigdda new` still marks as placeholders; none of a name."""
-    file = Path(path)
-    if not file.is_file():
-        return []
-    return value_origins.placeholders(file.read_text(encoding="utf-8", errors="replace"))
+    return [mark.path for mark in value_origins.marks_of(path)]
 
 
 def _origin(site: Site) -> Iterator[str]:

@@ -529,10 +529,15 @@ def _console(stderr: bool = False) -> Console:
 
 def warn_of_placeholders(site: str) -> None:
     """Print a note if a site file still has placeholders of `rigdda new`."""
-    from rigdda.app import site_check
+    from rigdda.app import value_origins
 
-    if left := site_check.placeholders(site):
-        note(f"the site file marks {len(left)} values as placeholders to replace")
+    note_placeholders(len(value_origins.marks_of(site)))
+
+
+def note_placeholders(count: int) -> None:
+    """Print a note if a site file marks some values as placeholders."""
+    if count:
+        note(f"the site file marks {count} values as placeholders to replace")
 
 
 TRAFFIC_HEADING = (

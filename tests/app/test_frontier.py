@@ -244,7 +244,7 @@ def test_a_dear_layout_is_not_chosen_for_a_difference_by_chance() -> None:
         chance = dict.fromkeys(BARE.reach, estimate(count, n))
         found = replace(BARE, layout=layout, objective=z, cost=cost, reach=chance,
                         failure=dict.fromkeys(BARE.reach, estimate(0, n)))  # fmt: skip
-        return replace(found, targets=PROBLEM.state(found))
+        return replace(found, targets=problem.state(found))
 
     problem = Valley(SITE, targets={"reach": 0.002})
     lucky = evaluated((FENCE,), 400.0, 7499.0, 3, 140)
@@ -252,6 +252,9 @@ def test_a_dear_layout_is_not_chosen_for_a_difference_by_chance() -> None:
     assert best_of_finals(problem, [lucky, both]) == both
     worse = evaluated((DITCH,), 100.0, 300.0, 60, 140)
     assert best_of_finals(problem, [lucky, both, worse]) == both
+    open_ = evaluated((DITCH, FENCE), 900.0, 9e3, 1, 140)
+    assert open_.targets == "undecided"  # layouts that are shown to miss it rank behind it
+    assert best_of_finals(problem, [lucky, both, open_, worse]) == open_
     within = evaluated((), 300.0, 0.0, 0, 140)
     assert best_of_finals(problem, [lucky, both, within]) == within
     free = Valley(SITE)
@@ -337,3 +340,31 @@ def test_a_missed_target_returns_a_verified_frontier(
     assert resumed.simulated == 0 and again.frontier == done.frontier
     design_report.write_frontier(tmp_path, problem, ())
     assert not (tmp_path / "frontier.csv").exists()
+
+
+def test_an_undecided_layout_is_replaced_by_one_that_meets_the_target() -> None:
+    """The rule meets the target, whereas that of the search may miss it."""
+
+    def evaluated(layout: tuple, z: float, count: int, n: int) -> Evaluation:
+        chance = dict.fromkeys(BARE.reach, estimate(count, n))
+        none = dict.fromkeys(BARE.reach, estimate(0, n))
+        found = replace(BARE, layout=layout, objective=z, reach=chance, failure=none, releases=n)
+        return replace(found, targets=PROBLEM.state(found))
+
+    rule, cheap = evaluated((FENCE,), 900.0, 0, 1000), evaluated((DITCH,), 100.0, 30, 1000)
+    assert (rule.targets, cheap.targets) == ("met", "undecided")
+    known = {own.layout: own for own in (rule, cheap, evaluated((), 200.0, 500, 1000))}
+    checked: list[str] = []
+
+    def check(layout: tuple, stage: str) -> Evaluation:
+        checked.append(stage)
+        return known[layout]
+
+    result = DesignResult(PROBLEM.site, cheap.layout, cheap, History(()), 10, "search", (), 0.0, ())
+    cases = [VerifiedLayout(n, e) for n, e in zip("abc", (known[()], rule, cheap), strict=True)]
+    found, front, replaced = verified_frontier.with_frontier(PROBLEM, result, cases, check, True)
+    assert (found.layout, front, replaced) == (rule.layout, (), True)
+    assert cases[-1].evaluation == rule and checked == ["frontier", "frontier"]
+    alone = [VerifiedLayout("a", known[()]), VerifiedLayout("c", cheap)]
+    same = verified_frontier.with_frontier(PROBLEM, result, alone, check, True)
+    assert same == (result, (), False)

@@ -14,7 +14,7 @@ from processes import png_size, refused, rig, run
 
 import rigdda
 from rigdda import Event, Site
-from rigdda.app import site_check, site_oddities
+from rigdda.app import site_check, site_oddities, value_origins
 from rigdda.app.site_check import Trial
 from rigdda.app.site_oddities import oddities
 from rigdda.ground.grounds import GROUNDS
@@ -770,3 +770,25 @@ def test_progress_of_a_check_needs_no_terminal(tmp_path):
     out, err = process.communicate(timeout=300)
     assert (process.returncode, err) == (0, "")
     assert "source mass: a jointed mass" in out and "1 thing looks odd" in out
+
+
+def test_placeholders_stay_marked_in_files_that_commands_write(tmp_path: Path) -> None:
+    text = "\n".join(
+        (
+            'name = "a"', "# Density; placeholder: replace.", "level = 3", "[[sources]]",
+            "# Band; placeholder: replace.", "# Second line.", "band = [1, 2]", "[[sources]]",
+            "band = [3, 4]", "# density; given.", "density = 2", "[surfaces.rock]",
+            "# Rolling; placeholder: replace.", "rolling = 0.1", "# # template = 3",
+        )
+    )  # fmt: skip
+    found = value_origins.marks(text)
+    assert [mark.path for mark in found] == ["level", "sources.band", "surfaces.rock.rolling"]
+    assert [mark.place for mark in found] == [0, 0, 0]
+    bare = "\n".join(line for line in text.splitlines() if not line.startswith("#"))
+    again = value_origins.with_marks(bare, found)
+    assert value_origins.marks(again) == found
+    site = Site.load("quick")
+    kept = [value_origins.Mark("slope", 0, "toe"), value_origins.Mark("events", 1, "rate")]
+    value_origins.save(site, tmp_path / "site.toml", kept)
+    assert set(value_origins.marks_of(tmp_path / "site.toml")) == set(kept)
+    assert Site.load(tmp_path / "site.toml") == site

@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from rigdda import BadInput, Ditch, Fence, Site
 from rigdda.agents.designers.menu import Menu
 from rigdda.app.barrier_checks import check_layout
+from rigdda.app.reports import findings
 from rigdda.app.reports.findings import DesignAnswer, FailedCheck, headline
 from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.barrier_formulas import checks_of
@@ -156,3 +157,19 @@ def test_ditches_are_compared_with_the_chart_where_no_block_passes(required: Des
     shallow = Ditch(7.0, 1.0, 0.5)
     assert {c.check for c in checks_of(required.site, shallow, None)} == {"width", "depth"}
     assert not required.fits((shallow,))
+
+
+def test_an_existing_barrier_that_fails_does_not_disqualify_a_layout() -> None:
+    """The worn fence stands with every layout and without any."""
+    site = replace(
+        Site.load("verge"),
+        existing=(Existing("fence", 5.2, height=1.0, energy_class=100, condition=0.3),),
+    )
+    checks = check_layout(DesignProblem(site), ())
+    assert checks.failed and all(check.existing for check in checks.failed)
+    assert checks.satisfied and findings.failed_checks(checks) == []
+    new = (Fence(8.0, 1.0, energy_class=100),)
+    both = check_layout(DesignProblem(site), new)
+    assert not both.satisfied
+    assert {check.barrier for check in both.failed if not check.existing} == {new[0].label}
+    assert len(findings.failed_checks(both)) < len(both.failed)

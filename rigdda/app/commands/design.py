@@ -144,6 +144,7 @@ def design(
     """
     from rigdda.agents.designers.store import PROBLEM_FILE, record_problem
     from rigdda.app import design as job
+    from rigdda.app import value_origins
     from rigdda.app.reports import design_report as report
     from rigdda.app.uncertainty.parameters import read_posterior
 
@@ -163,6 +164,7 @@ def design(
                 lambda cases: show_interim(
                     report.interim_line(cases), report.interim_table(cases)
                 ),
+                value_origins.marks_of(site),
             )  # fmt: skip
             tick(total, "pictures")
             report.write_design(done, folder, seed)

@@ -60,6 +60,7 @@ def fit(
     stopped.
     """
     import rigdda
+    from rigdda.app import value_origins
     from rigdda.app.reports import tables
     from rigdda.app.site_oddities import oddities
     from rigdda.app.uncertainty import fit as job
@@ -72,7 +73,9 @@ def fit(
     folder = folder_for(out, f"fit-{where.name}", *files)
     with recorded_run(folder, where), progress(budget) as tick:
         found = job.fit(where, seen, parameters, budget, releases, seed, tick, model, folder)
-        found.site.save(folder / "site.toml")
+        fitted = {one.path for one in parameters}
+        marked = [mark for mark in value_origins.marks_of(site) if mark.path not in fitted]
+        value_origins.save(found.site, folder / "site.toml", marked)
         job.write(folder / "fit.csv", found)
         job.draw(folder / "fit.png", found)
         tables.write_rows(folder / "posterior.csv", found.posterior.rows())

@@ -10,6 +10,7 @@ from rigdda.app.terminal import (
     RealNumber,
     finding,
     folder_for,
+    note_placeholders,
     out_option,
     recorded_run,
     show,
@@ -67,6 +68,7 @@ def reprice(
         raise click.UsageError("--out is the folder of the design: name another folder")
     with recorded_run(folder, done.problem.site):
         reprice_report.write(done, folder)
+    note_placeholders(len(done.placeholders))
     for change in done.changes:
         click.echo(reprice_report.changed(change))
     line = findings.headline(reprice_report.answer(done))

@@ -8,6 +8,7 @@ from typing import Any
 
 import rigdda
 from rigdda.agents.designers.frontier import TriedLayout
+from rigdda.app import value_origins
 from rigdda.app.design_study import SHED
 from rigdda.app.reports import design_report, findings, pictures
 from rigdda.app.reports.tables import known_risks, write_risks, write_rows
@@ -22,7 +23,7 @@ def write(done: Repriced, folder: Path) -> None:
     """Write the table, the site with its new values, the best layout and the pictures."""
     write_rows(folder / "costs.csv", rows(done))
     write_risks(folder, known_risks(done))
-    done.problem.site.save(folder / "site.toml")
+    value_origins.save(done.problem.site, folder / "site.toml", done.placeholders)
     rigdda.save_layout(done.chosen.evaluation.layout, folder / "layout.toml")
     points = [pictures.Point.of(case.name, case.evaluation) for case in done.cases]
     shed = pictures.Point(SHED, done.problem.site.shed(), 0.0, (0.0, 0.0))

@@ -43,7 +43,8 @@ def rows(found: Sensitivity) -> list[dict[str, Any]]:
             limits = (one.low, one.high) if isinstance(one, Parameter) else (math.nan, math.nan)
             row: dict[str, Any] = {"output": output.name, "unit": output.unit, "input": one.path}
             row |= {"range_low": limits[0], "range_high": limits[1], "change": _change(one, index)}
-            row |= {main: index.index, f"{main}_low": index.low, f"{main}_high": index.high}
+            ends = max(index.low, 0.0), index.high  # no main index can be negative
+            row |= {main: index.index, f"{main}_low": ends[0], f"{main}_high": ends[1]}
             row |= {other: index.first, f"{other}_low": index.first_low}
             row |= {f"{other}_high": index.first_high}
             if found.plan.method == "morris":

@@ -160,8 +160,11 @@ def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
     per_release = alone / between if between > 0.0 else 0.0
     count = round(per_release * one.releases)
     if count < LEAST_VALUES:
-        hint = f"a deposit of {one.releases} releases has as little information as {count} blocks: "
-        hint += "give the number of releases that made it in a column releases"
+        hint = (
+            f"a deposit of {one.releases} releases has as little information as {count} blocks, "
+            f"and a fit needs {LEAST_VALUES}: give deposits of more releases, with their number in "
+            "a column releases"
+        )
         raise BadInput(f"observed deposit of {one.event}", count, hint)
     return min(count, DEPOSIT_PIECES)
 
@@ -625,13 +628,21 @@ def _by_set(fitted: Fit) -> list[dict[str, Any]]:
     head = {"what": "score", "unit": "-" if mixed else "m", "fitted": own.score} | blank
     out: list[dict[str, Any]] = [head | {"observed": 0.0, "left_out": left.score}]
     for name, one in fitted.sets.items():
-        real, made = fitted.observed[name], fitted.best.run_outs[name]
+        real, made = _shown(fitted, name), fitted.best.run_outs[name]
         row = {"what": f"mean, {name}", "unit": one.unit, "fitted": float(made.mean())} | blank
         out.append(row | {"observed": float(real.mean()), "left_out": left.means[name]})
         ends = (float(np.quantile(values, 0.95)) for values in (made, real))
         row = {"what": f"95 %, {name}", "unit": one.unit, "fitted": next(ends)} | blank
         out.append(row | {"observed": next(ends), "left_out": ""})
     return out
+
+
+def _shown(fitted: Fit, name: str) -> Floats:
+    """Return the observed values of a set; of a deposit, those of equally heavy pieces of it."""
+    one = fitted.sets.get(name)
+    if one is None or one.quantity != DEPOSIT:
+        return fitted.observed[name]
+    return one.sample(DEPOSIT_PIECES)
 
 
 def write(path: Path, fitted: Fit) -> None:
@@ -659,8 +670,11 @@ def draw(path: Path, fitted: Fit) -> None:
         axes.fill_between(grid, np.clip(share - half, 0, 1), np.clip(share + half, 0, 1),
                           color="#1c5aa0", alpha=0.2, lw=0)  # fmt: skip
         axes.plot(grid, share, color="#1c5aa0", label="computed, 95 % band of samples of this size")
-        axes.ecdf(real, color="#c0392b", label="observed")
-        axes.set(xlabel=_axis(fitted, own[0]), title=f"{name}: {len(real)} observed", ylim=(0, 1))
+        axes.ecdf(np.concatenate([_shown(fitted, e) for e in own]), color="#c0392b",
+                  label="observed")  # fmt: skip
+        deposits = [e for e in own if e in fitted.sets and fitted.sets[e].quantity == DEPOSIT]
+        words = f"as {len(real)} blocks" if deposits else f"{len(real)} observed"
+        axes.set(xlabel=_axis(fitted, own[0]), title=f"{name}: {words}", ylim=(0, 1))
     figure.axes[0].set_ylabel("share of blocks")
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center",
                   fontsize=8, frameon=False)  # fmt: skip

@@ -173,7 +173,8 @@ def plausible(site: Site, layout: Layout) -> dict[str, tuple[Parameter, ...]]:
     """Return the uncertain numbers of a site with a layout by `GROUPS`.
 
     Numbers without influence are left out: rates and costs of 0, and prices without barriers. So
-    are numbers of which the site permits no other value.
+    are numbers of which the site permits no other value. Barriers that stand already have prices,
+    too, for upkeep and repair.
     """
     sizes = [_factor(f"events.{e.name}.size", 1.0, "size") for e in site.events if e.area]
     sized = (s for s in site.sources if s.edges is not None or s.polygon)
@@ -187,8 +188,9 @@ def plausible(site: Site, layout: Layout) -> dict[str, tuple[Parameter, ...]]:
     ]
     if layout:
         low, high = min(INTEREST[0], site.prices.interest), max(INTEREST[1], site.prices.interest)
-        money.append(_factor("prices.level", 1.0, "level"))
         money.append(Parameter("prices.interest", low, high))
+    if site.standing(layout) or layout:
+        money.append(_factor("prices.level", 1.0, "level"))
         if site.prices.removal > 0.0:
             money.append(_factor("prices.removal", site.prices.removal, "cost"))
     factors = ([_permitted(site, one) for one in group] for group in (sizes, rates, money))

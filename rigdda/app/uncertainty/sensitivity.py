@@ -517,7 +517,8 @@ def _outputs(
     terms = np.array([one.terms for one in priced])
     z = np.array([one.objective for one in priced])
     yield Output("Z", "EUR per metre and year", Response(z, terms, strata))
-    names = ["reached"] + (["failed"] if any(b.fallible for b in plan.layout) else [])
+    fallible = any(barrier.fallible for barrier in plan.site.standing(plan.layout))
+    names = ["reached", "failed"] if fallible else ["reached"]
     for name in names:
         happened = np.array([getattr(one, name) for one in priced], dtype=np.float64)
         for event in plan.site.events:

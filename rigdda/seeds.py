@@ -118,7 +118,7 @@ def release_seeds(stream: str, seed: int, n: int, start: int = 0) -> tuple[int, 
     n : int
         Number of seeds, at most `LONGEST_STREAM`.
     start : int
-        Number of seeds at the beginning of the stream that are skipped.
+        Number of seeds at the beginning of the stream that are skipped, at most `LONGEST_STREAM`.
 
     Raises
     ------
@@ -127,8 +127,9 @@ def release_seeds(stream: str, seed: int, n: int, start: int = 0) -> tuple[int, 
     """
     tag = stream_index(check.one_of("stream", stream, STREAMS))
     words = [check.integer("seed", seed, 0), tag]
+    first = check.integer("start", start, 0, LONGEST_STREAM)
     count = check.integer("releases", n, 0, LONGEST_STREAM)
-    drawn = _distinct(np.random.SeedSequence(words), start + count)[start:]
+    drawn = _distinct(np.random.SeedSequence(words), first + count)[first:]
     return tuple(word * len(STREAMS) + tag for word in drawn)
 
 

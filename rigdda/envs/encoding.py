@@ -52,7 +52,7 @@ def vector(field: str, value: ArrayLike, size: int) -> Floats:
     Raises
     ------
     BadInput
-        If the shape is wrong or an entry is not a number; the message names `field`.
+        If the shape is wrong or an entry is not a finite number; the message names `field`.
     """
     try:
         array = np.asarray(value)
@@ -63,7 +63,7 @@ def vector(field: str, value: ArrayLike, size: int) -> Floats:
         raise BadInput(field, value, f"give {size} numbers from -1 to 1") from None
     if array.shape != (size,):
         raise BadInput(f"shape of {field}", array.shape, f"give {size} numbers, shape ({size},)")
-    bad = np.flatnonzero(np.isnan(array))
+    bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
         raise BadInput(f"{field}[{bad[0]}]", float(array[bad[0]]), "give a number from -1 to 1")
     return np.clip(array, -1.0, 1.0)

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import MECHANICS, BadInput, Layout
-from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble
+from rigdda.agents.designers import catalogue as station_crossings
+from rigdda.agents.designers.catalogue import CrossingEnsemble
 from rigdda.agents.designers.forecast import LAYOUT_FEATURES as EVENT_FEATURES
 from rigdda.agents.designers.forecast import Forecast, forecast_seeds, value_network
 from rigdda.agents.designers.menu import Menu
@@ -143,7 +144,7 @@ def of_site(
     """
     site, menu = problem.site, Menu(problem)
     if crossings is None:
-        crossings = ensemble(site, forecast_seeds(site), menu.stations)
+        crossings = station_crossings.ensemble(site, forecast_seeds(site), menu.stations)
     forecast = Forecast(problem, crossings, value_network())
     without = problem.nothing
     scale = max(without.objective, 1e-9)

@@ -87,6 +87,12 @@ def exam(
     show(ranking.table(found))
     for line in ranking.remarks(part, references):
         note(line)
+    if job.resumed:
+        note(
+            f"the layouts of {counted(job.resumed, 'task')} are those of an earlier run in this "
+            "folder; name another folder if the entry reads a file that has changed, such as a "
+            "model"
+        )
     click.echo(f"{counted(part.size, 'task')}, verified on {part.verification:,} releases each; "
                f"{', '.join(ranking.FILES)} are in {folder}")  # fmt: skip
     flags = ranking.broken(scores)

@@ -21,7 +21,7 @@ from rigdda.app.exam.messages import (
     Tables,
     TaskOrder,
 )
-from rigdda.app.exam.task import Task
+from rigdda.app.exam.task import Task, count_crossings
 from rigdda.barriers import from_table
 from rigdda.envs import DesignProblem
 
@@ -123,7 +123,8 @@ def problems_of(order: TaskOrder) -> tuple[DesignProblem, ...]:
 def practice(site: str, budget: int = 500, seed: int = 0, max_barriers: int = 3) -> Task:
     """Return a task on any site for the development of an entry, as the exam would pose it.
 
-    The releases are simulated in this process.
+    The releases are simulated in this process. Releases without barriers that designers of the
+    package simulate on the site are counted, as in the exam.
 
     Parameters
     ----------
@@ -144,4 +145,6 @@ def practice(site: str, budget: int = 500, seed: int = 0, max_barriers: int = 3)
     problem = DesignProblem(site, max_barriers)
     releases = check.integer("budget", budget, 0)
     counter = ReleaseCounter([problem], releases)
-    return Task(problem, str(site), releases, check.integer("seed", seed, 0, SEED), counter)
+    task = Task(problem, str(site), releases, check.integer("seed", seed, 0, SEED), counter)
+    count_crossings([task])
+    return task

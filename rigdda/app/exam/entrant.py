@@ -6,7 +6,7 @@ import importlib
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from threading import Lock
 from typing import Any
@@ -15,7 +15,6 @@ import msgspec
 import numpy as np
 
 from rigdda import BadInput, Simulation
-from rigdda.agents.designers import catalogue
 from rigdda.app.exam.messages import (
     BatchReply,
     CrossingsReply,
@@ -31,10 +30,9 @@ from rigdda.app.exam.messages import (
     decode_reply,
     encode,
 )
-from rigdda.app.exam.task import CorridorTask, Task, make_task
+from rigdda.app.exam.task import CorridorTask, Task, count_crossings, make_task
 from rigdda.barriers import as_layout, to_tables
 from rigdda.dynamics.single_block import SingleBlock
-from rigdda.envs.outcome_cache import fingerprint
 from rigdda.envs.problem import is_vector
 
 Entry = Callable[[Any], Any]
@@ -178,7 +176,7 @@ def _submission(
     """Let the entry work on a task and return what it submits."""
     task = make_task(order, line)
     sections = task.sections if isinstance(task, CorridorTask) else (task,)
-    _ask_scorer(sections)
+    count_crossings(sections)
     found = corridor_entry(task) if isinstance(task, CorridorTask) else (entry(task),)
     try:
         layouts = [_tables(own, layout) for own, layout in zip(sections, found, strict=True)]
@@ -191,16 +189,6 @@ def _tables(task: Task, layout: Any) -> list[dict[str, Any]]:
     """Return the tables of a layout or vector, which need not be feasible."""
     vector = isinstance(layout, np.ndarray) or is_vector(layout)
     return to_tables(task.problem.decode(layout) if vector else as_layout(layout))
-
-
-def _ask_scorer(sections: Sequence[Task]) -> None:
-    """Let the designers of the package ask the scorer for their releases without barriers."""
-    tasks = {own.problem.key: own for own in sections}
-
-    def ask(site: Any, seeds: Any, stations: Any) -> catalogue.CrossingEnsemble:
-        return tasks[fingerprint(site)].crossings(seeds, stations)
-
-    catalogue.ensemble = ask
 
 
 def equal_shares(entry: Entry) -> Entry:

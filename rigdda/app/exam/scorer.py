@@ -170,6 +170,7 @@ class Scorer:
         self.functions: Functions = {SITE_ENTRY: entry, CORRIDOR_ENTRY: corridor_entry}
         self._store = Store(folder / EVALUATIONS)
         self._done: dict[tuple[str, int], Submission] = {}
+        self.resumed = 0
 
     def run(self) -> list[ExamScore]:
         """Return the scores of all tasks.
@@ -213,6 +214,7 @@ class Scorer:
             raise BadInput("--out", str(self.folder), hint)
         rows = _decoded(known, list[Submission])
         self._done = {(row.name, row.budget): row for row in rows}
+        self.resumed = len(self._done)
 
     def _mark_folder(self, identity: dict[str, str]) -> None:
         """Note to which run the folder belongs."""

@@ -194,7 +194,11 @@ class ExamPart(msgspec.Struct, frozen=True):
 
     @property
     def complete(self) -> bool:
-        """Whether the results may enter the leaderboard: nothing but budgets is left out."""
+        """Whether the results may enter the leaderboard.
+
+        Nothing but budgets may be left out, and the seed must be 0: the best of several seeds would
+        be better by chance.
+        """
         whole = self.specification
         return (
             whole.current
@@ -202,6 +206,7 @@ class ExamPart(msgspec.Struct, frozen=True):
             and self.corridors == len(whole.corridors)
             and set(self.budgets) <= set(whole.budgets)
             and self.verification >= whole.verification
+            and self.seed == 0
         )
 
     def orders(self, budget: int) -> list[TaskOrder]:

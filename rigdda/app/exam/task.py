@@ -27,6 +27,7 @@ from rigdda.app.exam.messages import (
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.observation import Arrays, observe
+from rigdda.envs.outcome_cache import fingerprint
 from rigdda.envs.problem import is_vector
 from rigdda.seeds import release_seeds
 
@@ -291,3 +292,20 @@ def make_task(order: TaskOrder, line: Line) -> Task | CorridorTask:
         return CorridorTask(order, line)
     problem = DesignProblem(order.sites[0], order.max_barriers)
     return Task(problem, order.name, order.budget, order.seed, line)
+
+
+def count_crossings(tasks: Sequence[Task]) -> None:
+    """Let the designers of the package take the releases without barriers of tasks from them.
+
+    These releases are then counted. Those of other sites are simulated as before.
+    """
+    known = {own.problem.key: own for own in tasks}
+    before = catalogue.ensemble
+
+    def ask(
+        site: Site, seeds: Mapping[str, Sequence[int]], stations: NDArray[np.float64]
+    ) -> catalogue.CrossingEnsemble:
+        task = known.get(fingerprint(site))
+        return before(site, seeds, stations) if task is None else task.crossings(seeds, stations)
+
+    catalogue.ensemble = ask

@@ -133,13 +133,13 @@ def episodes_of(name: str) -> str:
 
 
 def costs_of(site: Site) -> str:
-    """Return the digest of the costs of random layouts, with their intervals."""
+    """Return the digest of the costs of random layouts."""
     problem = DesignProblem(site)
     low, high = problem.bounds
     random = np.random.default_rng(5)
     layouts = [problem.decode(random.uniform(low, high)) for _ in range(COSTS)]
     found = [problem.evaluate(layout, range(12)) for layout in layouts]
-    return digest(*((layout, e.objective, e.ci) for layout, e in zip(layouts, found, strict=True)))
+    return digest(*((layout, e.objective) for layout, e in zip(layouts, found, strict=True)))
 
 
 def case_of(case: Case) -> str:

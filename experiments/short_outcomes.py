@@ -139,7 +139,7 @@ def costs(site: Site, layout: Layout) -> list[float]:
             volume = 7.0 * i / 3.0
             outcomes.append(replace(usual, event=event, road_volume=volume, reached=i > 0))
     z = judge(site, layout, outcomes, {}, {})
-    return numbers([z.objective, z.ci, z.capital, z.harm, z.repair, z.cost, z.debris_ci])
+    return numbers([z.objective, z.capital, z.harm, z.repair, z.cost, z.debris])
 
 
 def computed() -> Iterator[tuple[str, list[float]]]:

@@ -15,12 +15,14 @@ import pytest
 from processes import refused
 
 from rigdda import MECHANICS, BadInput, Ditch, sites
+from rigdda.agents.designers import catalogue, value
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
+from rigdda.agents.learning import forecasts
 from rigdda.app.exam import counter, ranking, scorer, specification
 from rigdda.app.exam.counter import practice
 from rigdda.app.exam.specification import Anchor, References, tables
-from rigdda.envs import DesignProblem
+from rigdda.envs import DesignProblem, forecast_table
 from rigdda.model.site_names import NUMBERS, instance
 
 SITES = ("wide-narrow-2000000003", "wide-cliff-2000000004")
@@ -47,7 +49,7 @@ import numpy as np
 
 import rigdda
 from rigdda import Fence
-from rigdda.envs import DesignProblem
+from rigdda.envs import DesignProblem, forecast_table
 
 
 def honest(task):
@@ -340,7 +342,7 @@ def test_practice_counts_and_refuses() -> None:
 def test_interquartile_mean_and_its_interval() -> None:
     values = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 100.0])
     assert ranking.interquartile_mean(values) == pytest.approx(3.5)
-    low, high = ranking.interval(values, ["a"] * 8)
+    low, high = ranking.interval(np.repeat(values, 2), ["a"] * 16)
     assert low < 3.5 < high
     assert np.isnan(ranking.interval(values, [str(i) for i in range(8)])).all()
     rng = np.random.default_rng(0)
@@ -389,3 +391,46 @@ def test_a_specification_is_current_with_the_mechanics_of_its_references() -> No
     other = msgspec.structs.replace(known, mechanics="0ld")
     assert known.current and not other.current
     assert known.key != other.key
+
+
+def test_intervals_of_few_tasks_are_not_given() -> None:
+    values = np.linspace(0.0, 1.0, 27)
+    families = [f"f{i % 9}" for i in range(27)]
+    assert np.isfinite(ranking.interval(values, families)).all()
+    assert np.isnan(ranking.interval(values[:3], ["corridors"] * 3)).all()
+    assert np.isnan(ranking.interval(values[:10], families[:10])).all()  # eight single sites
+    assert np.isnan(ranking.interval(values, [str(i) for i in range(27)])).all()
+
+
+@pytest.mark.slow
+def test_intervals_of_three_sites_of_each_family_hold_the_mean() -> None:
+    """Without the correction for three values in a stratum, 90 % of them did."""
+    rng = np.random.default_rng(0)
+    families, centres = [f"f{i % 9}" for i in range(27)], rng.normal(0.7, 0.2, 9)
+    true = ranking.interquartile_mean((centres + rng.normal(0.0, 0.1, (20_000, 9))).ravel())
+    held = 0
+    for i in range(400):
+        values = centres[np.arange(27) % 9] + rng.normal(0.0, 0.1, 27)
+        low, high = ranking.interval(values, families, i)
+        held += low <= true <= high
+    assert held / 400 > 0.92
+
+
+def test_releases_without_barriers_count_in_practice() -> None:
+    """The designer `value` simulates them itself."""
+    before = catalogue.ensemble
+    try:
+        task = practice("quick", 200)
+        result = value.design(task.problem, task.left, task.seed, None, task.store())
+        assert 0 < result.simulations <= task.used <= 200
+        again = practice("quick", 200)
+        found = forecasts.of_site(again.problem, forecast_table.load().layouts)
+        assert found is not None and 0 < again.used <= 200
+    finally:
+        catalogue.ensemble = before
+
+
+def test_another_seed_cannot_enter_the_leaderboard() -> None:
+    spec = specification.load()
+    assert specification.part(spec).complete
+    assert not specification.part(spec, seed=1).complete

@@ -67,9 +67,14 @@ def test_encoding_is_undone_by_decoding(vector: np.ndarray) -> None:
     agree(layout, PROBLEM.decode(code))
 
 
-@given(arrays(float, 3 * SLOT, elements=st.floats(allow_nan=False)))
+@given(arrays(float, 3 * SLOT, elements=st.floats(allow_nan=False, allow_infinity=False)))
 def test_numbers_beyond_the_bounds_are_clipped(values: np.ndarray) -> None:
     assert PROBLEM.decode(values) == PROBLEM.decode(np.clip(values, -1.0, 1.0))
+
+
+def test_infinite_numbers_are_those_of_a_diverged_network() -> None:
+    with pytest.raises(BadInput, match="number from -1 to 1"):
+        PROBLEM.decode(np.full(3 * SLOT, np.inf))
 
 
 @pytest.mark.parametrize("name", [*sites.design_names(), "quick"])

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from rigdda import BadInput, Error, Layout, check
-from rigdda.agents.designers import catalogue
+from rigdda.agents.designers.catalogue import ensemble  # not that of `count_crossings`
 from rigdda.agents.designers.store import Store, StoredEvaluation
 from rigdda.agents.limits import SEED
 from rigdda.app.exam.messages import (
@@ -94,7 +94,7 @@ class ReleaseCounter:
         seeds = request.seeds
         if request.stations is not None and isinstance(seeds, dict):
             stations = np.array(request.stations)
-            return CrossingsReply.of(catalogue.ensemble(problem.site, seeds, stations))
+            return CrossingsReply.of(ensemble(problem.site, seeds, stations))
         layout = problem.check(from_tables(request.layout))
         if isinstance(seeds, dict):
             found = self._store.sample(problem, layout, seeds)

@@ -300,18 +300,23 @@ def check_step(settings: Settings, areas: NDArray[np.float64], gravity: float) -
         raise BadInput("dt", settings.dt, hint)
 
 
+NET, WALL = 0, 1
+"""Surfaces of fences and of gravity walls, after the named surfaces."""
+
+
 def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
     """Return the interface properties of each pair of surfaces.
 
-    The surface of fences comes last. It has no restitution, strength, friction and rolling
-    resistance, because a net moves along with what it holds.
+    The surfaces of fences and gravity walls come last. That of fences has no restitution, strength,
+    friction and rolling resistance, because a net moves along with what it holds. That of gravity
+    walls is the surface of barriers without rolling resistance, which would keep a wall from
+    overturning: its moment at the toe would add to that of the weight.
     """
-    fences = any(isinstance(b, Fence) for b in scene.barriers)
-    every = [*names, scene.barrier_surface] if fences else names
+    movable = any(isinstance(b, Fence | GravityWall) for b in scene.barriers)
+    own = names.index(scene.barrier_surface) if movable else 0
+    every = [*names, *([scene.barrier_surface] * 2 if movable else [])]
     found = np.zeros((len(every), len(every)), dtype=INTERFACE)
     found["restitution_speed"] = math.inf
-    found["friction"] = frictions(scene, len(every))
-    found["friction"][len(names) :] = found["friction"][:, len(names) :] = 0.0
     for i, a in enumerate(names):
         for j, b in enumerate(names):
             surface = scene.interface(a, b)
@@ -321,13 +326,19 @@ def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
             found["rolling"][i, j] = surface.rolling
             if surface.restitution_speed is not None:
                 found["restitution_speed"][i, j] = surface.restitution_speed
+    net, wall = len(names) + NET, len(names) + WALL
+    if movable:
+        found[wall], found[:, wall] = found[own], found[:, own]
+        found["rolling"][wall] = found["rolling"][:, wall] = 0.0
+        found[net] = found[:, net] = np.zeros(1, dtype=INTERFACE)
+        found["restitution_speed"][net] = found["restitution_speed"][:, net] = math.inf
+    found["friction"] = frictions(scene, every)
+    found["friction"][net : net + 1] = found["friction"][:, net : net + 1] = 0.0
     return found.view(np.recarray)
 
 
-def frictions(scene: Scene, size: int) -> list[list[float]]:
-    """Return the coefficient of friction of each pair of `size` surfaces, see `pack_interfaces`."""
-    every = list(scene.surfaces)
-    every += [scene.barrier_surface] * (size - len(every))
+def frictions(scene: Scene, every: list[str]) -> list[list[float]]:
+    """Return the coefficient of friction of each pair of surfaces."""
     return [[math.tan(math.radians(scene.friction_deg(a, b))) for b in every] for a in every]
 
 
@@ -391,7 +402,7 @@ def free_bodies(scene: Scene) -> int:
 def pack_bodies(scene: Scene, names: list[str]) -> tuple[Bodies, Outlines]:
     """Return blocks, then barriers, as bodies in their initial state, and their outlines.
 
-    The surface of fences follows the named surfaces.
+    The surfaces of fences and gravity walls follow the named surfaces.
     """
     polygons = [b.vertices for b in scene.blocks] + [scene.outline(i) for i in scene.bodies]
     bodies = np.zeros(len(polygons), dtype=BODY)  # columns are faster to set than in a recarray
@@ -431,11 +442,10 @@ def barrier_trait(scene: Scene, number: int, names: list[str]) -> Trait:
     if isinstance(barrier, Fence):
         area = polygon_properties(scene.outline(number))[0]
         density = MASS * barrier.height / area
-        return density, 0.0, 0.0, 0.0, len(names), ASLEEP
-    surface = names.index(scene.barrier_surface)
+        return density, 0.0, 0.0, 0.0, len(names) + NET, ASLEEP
     if isinstance(barrier, GravityWall):
-        return barrier.density, 0.0, 0.0, 0.0, surface, AWAKE
-    return 1.0, 0.0, 0.0, 0.0, surface, FIXED
+        return barrier.density, 0.0, 0.0, 0.0, len(names) + WALL, AWAKE
+    return 1.0, 0.0, 0.0, 0.0, names.index(scene.barrier_surface), FIXED
 
 
 def start_fences(scene: Scene, bodies: Bodies, parameters: NDArray[np.void]) -> None:

@@ -38,7 +38,12 @@ from rigdda.barriers import (
     section,
     standing,
 )
-from rigdda.barriers.base import Reach, sliding_resistance, surfaces_below
+from rigdda.barriers.base import (
+    Reach,
+    base_inclination,
+    sliding_resistance,
+    surfaces_below,
+)
 from rigdda.dynamics.monitors import chainages
 from rigdda.dynamics.run import Run
 from rigdda.dynamics.simulation import Simulation
@@ -79,6 +84,8 @@ class StandingBarrier(NamedTuple):
     """Where it holds rock, without the slope of the deposit."""
     area: float
     """Area of its outline [m2]."""
+    inclination: float
+    """Inclination of the ground under it, see `base_inclination` [deg]."""
     base: list[tuple[int, int]]
     """Pairs of surfaces on which an embankment may slide."""
     road_area: float
@@ -126,14 +133,16 @@ class SingleReleases:
     def _stand(self, index: int, names: list[str]) -> StandingBarrier:
         """Return the fixed properties of a barrier; `names` lists the surfaces in order."""
         scene, barrier = self._scene, self._scene.barriers[index]
-        outline, base = scene.outline(index), []
+        outline, base, inclination = scene.outline(index), [], 0.0
         if isinstance(barrier, Embankment):
             assert scene.terrain is not None
+            inclination = base_inclination(scene.terrain, outline)
             own = names.index(scene.fill)
             base = [(own, names.index(n)) for n in surfaces_below(scene.terrain, outline)]
         return StandingBarrier(
             reach=barrier.holds(outline, scene.ground, 0.0),
             area=section(outline),
+            inclination=inclination,
             base=base,
             road_area=barrier.area_beyond(self._site.road.start, outline),
         )
@@ -183,7 +192,8 @@ class SingleReleases:
         if not isinstance(barrier, Embankment):
             return barrier.resistance(self._scene, NEVER)
         friction = min(float(self._properties.friction_deg[pair]) for pair in standing.base)
-        return sliding_resistance(self._gravity, barrier.density, standing.area, friction)
+        angle = friction - standing.inclination
+        return sliding_resistance(self._gravity, barrier.density, standing.area, angle)
 
     def _ending(
         self,

@@ -400,14 +400,26 @@ def section(outline: Floats) -> float:
 
 
 def base_friction(scene: Subsoil, density: float, own: str, outline: Floats) -> float:
-    """Return the sliding resistance of a body on the ground: weight times base friction [N/m].
+    """Return the horizontal thrust at which a body slides downhill on the ground [N/m].
 
-    The friction is the least between its surface `own` and the surfaces under it.
+    The friction is the least between its surface `own` and the surfaces under it, see
+    `sliding_resistance`.
     """
     assert scene.terrain is not None
     below = surfaces_below(scene.terrain, outline)
     angle = min(scene.interface(own, name).friction_deg for name in below)
+    angle -= base_inclination(scene.terrain, outline)
     return sliding_resistance(-scene.gravity_vector[1], density, section(outline), angle)
+
+
+def base_inclination(terrain: Terrain, outline: Floats) -> float:
+    """Return the inclination of the ground between the ends of an outline [deg].
+
+    It is positive where the ground falls in the direction of x.
+    """
+    ends = np.array([outline[:, 0].min(), outline[:, 0].max()])
+    high, low = np.interp(ends, *terrain.points.T)
+    return math.degrees(math.atan2(high - low, ends[1] - ends[0]))
 
 
 def surfaces_below(terrain: Terrain, outline: Floats) -> list[str]:
@@ -421,13 +433,20 @@ def surfaces_below(terrain: Terrain, outline: Floats) -> list[str]:
     ]
 
 
-def sliding_resistance(gravity: float, density: float, area: float, friction_deg: float) -> float:
-    """Return the thrust at which a body slides on level ground [N/m].
+def sliding_resistance(gravity: float, density: float, area: float, angle_deg: float) -> float:
+    """Return the horizontal thrust at which a body slides on the ground [N/m].
 
-    It is the weight times the coefficient of friction, for gravity [m/s2], density [kg/m3], area
-    [m2] and friction angle [deg].
+    From the equilibrium on ground that falls at an angle b in the direction of the thrust, it is W
+    tan(phi - b) with the weight W and the friction angle phi, and 0 if b is greater.
+
+    Parameters
+    ----------
+    gravity, density, area : float
+        Gravity [m/s2], density [kg/m3] and area of the section [m2].
+    angle_deg : float
+        Friction angle less the inclination of the ground, phi - b [deg].
     """
-    return gravity * density * area * math.tan(math.radians(friction_deg))
+    return gravity * density * area * math.tan(math.radians(max(angle_deg, 0.0)))
 
 
 FOUNDATION = 1.0

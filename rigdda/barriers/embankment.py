@@ -40,8 +40,9 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
     """An embankment of compacted soil with a level crest, raised on the terrain.
 
     Its surface is "soil" if the scene defines it, otherwise that of the other barriers. If the
-    thrust of resting and impacting rock, averaged over one second, exceeds its weight times its
-    base friction, it is pushed away and has no further effect.
+    thrust of resting and impacting rock, averaged over one second, exceeds W tan(phi - b), with its
+    weight W, its base friction phi and the inclination b of the ground, it is pushed away and has
+    no further effect.
 
     Raises
     ------
@@ -143,7 +144,7 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
         return site.prices.embankment * section(outline)
 
     def resistance(self, scene: Subsoil, outline: Floats) -> float:
-        """Return its weight times its base friction [N/m]."""
+        """Return the horizontal thrust at which it slides, see `base_friction` [N/m]."""
         return base_friction(scene, self.density, scene.fill, outline)
 
     def idle_resistance(self, other: Barrier, resistance: float) -> float:

@@ -97,7 +97,7 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
         return site.prices.concrete * self.height * self.thickness
 
     def resistance(self, scene: Subsoil, outline: Floats) -> float:
-        """Return its weight times its base friction [N/m]."""
+        """Return the horizontal thrust at which it slides, see `base_friction` [N/m]."""
         return base_friction(scene, self.density, scene.barrier_surface, outline)
 
     def idle_resistance(self, other: Barrier, resistance: float) -> float:

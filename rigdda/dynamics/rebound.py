@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from rigdda.dynamics.arrays import Rows
-from rigdda.dynamics.constants import ROUNDING, SPEED_LIMIT
+from rigdda.dynamics.constants import MOST_SWEEPS, ROUNDING, SPEED_LIMIT
 from rigdda.dynamics.rows import (
     AIM,
     BEFORE,
@@ -157,11 +157,13 @@ def rebound(
     sweeps, share = 0, 1.0
     for attempt in range(3):
         aim_rebound(rows, n, struck, share)
-        sweeps += settle(rows, n, struck, number, math.inf, tolerance)
+        swept = settle(rows, n, struck, number, math.inf, tolerance)
+        sweeps += swept
         work = work_from(rows, struck, BEFORE)
-        if lost + work <= -ROUNDING * lost:
+        converged = swept < MOST_SWEEPS
+        if converged and lost + work <= -ROUNDING * lost:
             break
-        share = min(max(-lost / work, 0.0), 1.0) if attempt == 0 else 0.0
+        share = min(max(-lost / work, 0.0), 1.0) if converged and attempt == 0 else 0.0
         if attempt == 2:  # the sweeps do not converge: no rebound
             take_back(rows, n, struck)
     end_rebound(rows, struck)

@@ -42,7 +42,7 @@ from rigdda.dynamics.rows import (
     along_six,
     push,
 )
-from rigdda.dynamics.slots import copy_velocities, kinetic
+from rigdda.dynamics.slots import copy_velocities
 from rigdda.kernel import arithmetic_kernel, kernel
 
 
@@ -264,12 +264,12 @@ def settle_safely(
 ) -> int:
     """Settle a substep without increasing the energy; return the sweeps.
 
-    If the sweeps neither converge nor lose energy, as where a heavy body squeezes a light one
-    aside, they are repeated from contacts without impulses and without extrapolation, which never
-    increases the energy.
+    If the sweeps do not converge, as where a heavy body squeezes a light one aside, they are
+    repeated from contacts without impulses and without extrapolation, which never increases the
+    energy.
     """
     sweeps = settle(rows, n, active, number, reach, tolerance)
-    if sweeps < MOST_SWEEPS or kinetic(rows.slot, n, NOW) <= kinetic(rows.slot, n, FREE):
+    if sweeps < MOST_SWEEPS:
         return sweeps
     copy_velocities(rows.slot, n, FREE, NOW)
     for q in range(active):
@@ -279,24 +279,26 @@ def settle_safely(
 
 
 @kernel
-def extrapolate(rows: Rows, active: int, before: float) -> float:
+def extrapolate(rows: Rows, active: int, most: float) -> float:
     """Extrapolate the impulses from their changes by the last sweeps and by those before.
 
     A set of sweeps is a step of a fixed-point iteration x -> G(x) with the residual r = G(x) - x.
     In Anderson's method of depth one (Anderson 1965), the next x is G - theta dG, where d is the
     change since the last extrapolation and theta = r dr / dr^2. It removes the error that decreases
-    most slowly, as that of a heavy body that rests or falls on a light one. If the residual has
-    grown, the last extrapolation is taken back.
+    most slowly, as that of a heavy body that rests or falls on a light one. If an extrapolation does
+    not halve the square of the residual, it is taken back, and there is no other. In a wedge that
+    locks by friction, residuals stay the same while impulses grow without bounds.
 
     Parameters
     ----------
-    before : float
-        Square of the residual at the last extrapolation [J]; inf at the first.
+    most : float
+        Greatest square of the residual for which the last extrapolation is kept [J]; inf if there
+        was none.
 
     Returns
     -------
     float
-        Square of the residual [J], or -1 if it has grown.
+        The same for the next call, or -1 if the last extrapolation was taken back.
     """
     square = slope = curvature = 0.0
     for place in range(active):
@@ -308,29 +310,31 @@ def extrapolate(rows: Rows, active: int, before: float) -> float:
             square += row[FLEXIBLE] * residue * residue
             slope += row[FLEXIBLE] * residue * change
             curvature += row[FLEXIBLE] * change * change
-    grew = square > before
-    share = max(-slope / curvature, 0.0) if curvature > 0.0 and not grew else 0.0
+    failed = square > most
+    share = max(-slope / curvature, 0.0) if curvature > 0.0 and not failed else 0.0
     for place in range(active):
         k = rows.active[place]
         row, fact = rows.row[k], rows.fact[k]
         a, b = rows.slot[rows.row_i[k]], rows.slot[rows.row_j[k]]
         for q in range(2):
             goal = row[IMPULSE + q]
-            more = fact[GOAL + q] - goal if grew else share * (goal - fact[GOAL + q])
+            more = fact[GOAL + q] - goal if failed else share * (goal - fact[GOAL + q])
             push(row, NORMAL if q == 0 else SHEAR, a, b, NOW, more)
             fact[RESIDUE + q] = goal - fact[REACHED + q]
             fact[GOAL + q] = goal
             fact[REACHED + q] = row[IMPULSE + q] = goal + more
-    return -1.0 if grew else square
+    if failed:
+        return -1.0
+    return 0.5 * square if share > 0.0 else math.inf
 
 
 @kernel
 def sweep_until(
-    rows: Rows, n: int, active: int, number: int, reach: float, tolerance: float, square: float
+    rows: Rows, n: int, active: int, number: int, reach: float, tolerance: float, most: float
 ) -> int:
     """Sweep until no velocity changes by more than a tolerance, or `MOST_SWEEPS` times.
 
-    `square` is inf, or -1 to sweep without extrapolation, see `extrapolate`.
+    `most` is inf, or -1 to sweep without extrapolation, see `extrapolate`.
     """
     start_extrapolation(rows, active)
     for s in range(n + 1):
@@ -340,8 +344,8 @@ def sweep_until(
         worst = sweep(rows, n, visits, tries, number, reach, tolerance)
         if worst <= tolerance:
             return tries + 1
-        if (tries + 1) % SET_OF_SWEEPS == 0 and square >= 0.0 and tries + 1 < MOST_SWEEPS:
-            square = extrapolate(rows, active, square)
+        if (tries + 1) % SET_OF_SWEEPS == 0 and most >= 0.0 and tries + 1 < MOST_SWEEPS:
+            most = extrapolate(rows, active, most)
             for s in range(n + 1):
                 rows.moved_in[s] = tries
     return MOST_SWEEPS

@@ -285,8 +285,8 @@ def extrapolate(rows: Rows, active: int, most: float) -> float:
     A set of sweeps is a step of a fixed-point iteration x -> G(x) with the residual r = G(x) - x.
     In Anderson's method of depth one (Anderson 1965), the next x is G - theta dG, where d is the
     change since the last extrapolation and theta = r dr / dr^2. It removes the error that decreases
-    most slowly, as that of a heavy body that rests or falls on a light one. If an extrapolation does
-    not halve the square of the residual, it is taken back, and there is no other. In a wedge that
+    most slowly, as that of a heavy body that rests or falls on a light one. An extrapolation that
+    does not halve the square of the residual is taken back, and there is no other. In a wedge that
     locks by friction, residuals stay the same while impulses grow without bounds.
 
     Parameters

@@ -64,8 +64,8 @@ def keep_sideways(contacts: Contacts, low: int, high: int, most: float) -> int:
     """Keep only the contacts low:high that push sideways; return the new number of contacts.
 
     A net stops blocks that come against it, but not blocks that fall on its top. Blocks that are
-    already in it by more than `most` [m] pass over it: half its thickness and the path that a
-    corner of a turning block may cover in a step.
+    already in it by more than `most` [m] pass over it. This is half its thickness and the way
+    along x that a corner of a turning block may cover in a step.
     """
     kept = low
     for k in range(low, high):
@@ -100,7 +100,9 @@ def collide_block(
         count = collide_pair(bodies, outlines, contacts, count, a, b, p)
         if count > before and (bodies[a].brake > 0.0 or bodies[b].brake > 0.0):
             fence, block = (a, b) if bodies[a].brake > 0.0 else (b, a)
-            most = abs(outlines.local[fence, 0].x) + bodies[block].path
+            rock = bodies[block]
+            way = p.dt * (abs(rock.vx) + abs(rock.omega) * rock.radius)
+            most = abs(outlines.local[fence, 0].x) + way
             count = keep_sideways(contacts, before, count, most)
     if count < 0 or count > room:
         return -1

@@ -137,6 +137,18 @@ def aim_rebound(rows: Rows, n: int, active: int, share: float) -> None:
 
 
 @kernel
+def impulses_from(rows: Rows, active: int) -> tuple[float, float]:
+    """Return the sums of the normal impulses of the impact and of its rebound [N s]."""
+    impact = opened = 0.0
+    for q in range(active):
+        row, fact = rows.row[rows.active[q]], rows.fact[rows.active[q]]
+        if row[STIFFNESS] == 0.0:
+            impact += fact[LOAD]
+            opened += row[IMPULSE] - (fact[LOAD] if fact[BOUNCE] != 0.0 else 0.0)
+    return impact, opened
+
+
+@kernel
 def rebound(
     rows: Rows, n: int, active: int, number: int, h: float, tolerance: float, touch: float
 ) -> int:
@@ -148,6 +160,9 @@ def rebound(
     impact, which did the work `lost` < 0 [J], cannot. Energy is quadratic in the velocities, so the
     gain is a convex function of the fraction of restitution. At the fraction where the chord from
     plastic to full restitution is zero, the gain is therefore not positive.
+
+    Contacts that friction locks, as those on both sides of a wedge, cannot open: the sweeps do not
+    converge, and their impulses exceed those of the impact. Then there is no restitution.
     """
     rows.slot[n, BOUNCES] = 0.0  # what does not move is not struck
     struck = list_struck(rows, active)
@@ -160,10 +175,11 @@ def rebound(
         swept = settle(rows, n, struck, number, math.inf, tolerance)
         sweeps += swept
         work = work_from(rows, struck, BEFORE)
-        converged = swept < MOST_SWEEPS
-        if converged and lost + work <= -ROUNDING * lost:
+        impact, opened = impulses_from(rows, struck)
+        locked = swept == MOST_SWEEPS and opened > impact
+        if lost + work <= -ROUNDING * lost and not locked:
             break
-        share = min(max(-lost / work, 0.0), 1.0) if converged and attempt == 0 else 0.0
+        share = min(max(-lost / work, 0.0), 1.0) if attempt == 0 and not locked else 0.0
         if attempt == 2:  # the sweeps do not converge: no rebound
             take_back(rows, n, struck)
     end_rebound(rows, struck)

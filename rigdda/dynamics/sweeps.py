@@ -42,7 +42,7 @@ from rigdda.dynamics.rows import (
     along_six,
     push,
 )
-from rigdda.dynamics.slots import copy_velocities
+from rigdda.dynamics.slots import copy_velocities, kinetic
 from rigdda.kernel import arithmetic_kernel, kernel
 
 
@@ -269,7 +269,7 @@ def settle_safely(
     energy.
     """
     sweeps = settle(rows, n, active, number, reach, tolerance)
-    if sweeps < MOST_SWEEPS:
+    if sweeps < MOST_SWEEPS or kinetic(rows.slot, n, NOW) <= kinetic(rows.slot, n, FREE):
         return sweeps
     copy_velocities(rows.slot, n, FREE, NOW)
     for q in range(active):

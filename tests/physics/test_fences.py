@@ -26,6 +26,7 @@ from rigdda import (
 from rigdda.barriers import FENCE_CLASSES
 from rigdda.dynamics.constants import ASLEEP, RETIRED, SUBSTEPS
 from rigdda.dynamics.monitors import FAILED
+from rigdda.model.settings import site_step
 from rigdda.validation.barriers import (
     CAPACITY,
     ELONGATION,
@@ -545,3 +546,24 @@ def test_a_slip_of_the_unit_is_told():
 def test_a_scene_needs_what_a_fence_takes_per_metre():
     with pytest.raises(BadInput, match="for_width"):
         Scene(GROUND, (box(-3.0, 1.0),), rock(), barriers=(Fence(0.0, 3.0, energy_class=500),))
+
+
+@at_all_steps
+@pytest.mark.parametrize(("radius", "speed"), [(0.15, 20.0), (0.3, 30.0), (0.5, 30.0)])
+def test_no_turning_block_gets_through(radius, speed, dt):
+    """A corner of a block that rolls may turn by half a radian in a step, deep into the net."""
+    passed = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        corners = rough(rng, int(rng.integers(4, 9)), radius)
+        turning = -speed / radius * rng.uniform(0.7, 1.1)
+        start = -radius - 0.1 - rng.uniform(0.0, 0.03 * speed), rng.uniform(1.0, 2.5)
+        velocity = speed, rng.uniform(-0.1, 0.1) * speed, turning
+        block = Block(polygon(corners, start, rng.uniform(0.0, 6.3)), velocity=velocity)
+        fence = Fence(0.0, 5.0, 6.5e6, elongation=7.5)
+        scene = Scene(GROUND, (block,), rock(35.0, 0.3), barriers=(fence,))
+        step = site_step(dt, np.array([masses(scene)[0][0] / 2600.0]), GRAVITY)
+        sim = Simulation(scene, Settings(dt=step))
+        run = sim.run(1.0, every=0.02)
+        passed += sim.poses[0, 0] > run.barrier_poses[-1, 0, 0]
+    assert passed <= 1

@@ -9,7 +9,21 @@ import pytest
 from msgspec.structs import replace
 
 from physics.helpers import FLAT, GRAVITY, box, rock
-from rigdda import Block, Fence, GravityWall, Run, Scene, Simulation, Site, Terrain, Wall, release
+from rigdda import (
+    Block,
+    Embankment,
+    Fence,
+    GravityWall,
+    Run,
+    Scene,
+    Simulation,
+    Site,
+    Surface,
+    Terrain,
+    Wall,
+    release,
+)
+from rigdda.geometry import polygon_properties
 from rigdda.releases import release_many
 from rigdda.validation.barriers import FACE, LOADING_TIME, Push, displacement
 from rigdda.validation.case import Lab
@@ -129,3 +143,31 @@ def test_a_wall_that_overturned_and_stands_again_has_failed_in_many_releases_too
     (found,) = release_many([(site, (wall,), 1, "mass")])
     assert found == release(site, (wall,), 1, "mass")[1]
     assert found.barriers[0].failed
+
+
+@pytest.mark.parametrize("rolling", [0.1, 0.4])
+def test_rolling_resistance_does_not_keep_a_wall_upright(rolling):
+    """It overturns at W b / (2 h), whatever the ground resists to blocks that roll on it."""
+    push = Push(GravityWall(FACE, 2.0, 1.0), 60.0, 1.9)
+    for share, falls in ((0.97, False), (1.04, True)):
+        scene = push.scene(share * push.limit())
+        surfaces = dict(scene.surfaces) | {"rock": Surface(60.0, 0.0, rolling=rolling)}
+        scene = Scene(scene.terrain, scene.blocks, surfaces, barriers=scene.barriers)
+        x, y, _ = displacement(Lab(5e-3), scene)
+        assert (math.hypot(x, y) > 1e-3) == falls
+
+
+@pytest.mark.parametrize("slope_deg", [-10.0, 0.0, 15.0, 25.0, 40.0])
+def test_the_resistance_on_a_slope_is_that_of_statics(slope_deg):
+    """H = W tan(phi - b), and none on a slope that is steeper than the friction."""
+    fall = math.tan(math.radians(slope_deg))
+    ground = Terrain([(-60.0, 60.0 * fall), (60.0, -60.0 * fall)])
+    surfaces = {"rock": Surface(33.0), "soil": Surface(33.0)}
+    barriers = [GravityWall(0.0, 2.0, 1.0)]
+    if abs(slope_deg) <= 25.0:
+        barriers.append(Embankment(0.0, 2.0, width=1.0, side_slope=0.5))
+    for barrier in barriers:
+        scene = Scene(ground, (box(-20.0, 60.0),), surfaces, barriers=(barrier,))
+        weight = barrier.density * GRAVITY * abs(polygon_properties(scene.outline(0))[0])
+        right = weight * math.tan(math.radians(max(33.0 - slope_deg, 0.0)))
+        assert scene.resistance(0) == pytest.approx(right, rel=1e-6, abs=1e-6)

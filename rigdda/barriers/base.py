@@ -410,6 +410,16 @@ def base_friction(scene: Subsoil, density: float, own: str, outline: Floats) -> 
     return sliding_resistance(-scene.gravity_vector[1], density, section(outline), angle)
 
 
+def base_inclination(terrain: Terrain, outline: Floats) -> float:
+    """Return the inclination of the ground between the ends of an outline [deg].
+
+    It is positive where the ground falls in the direction of x.
+    """
+    ends = np.array([outline[:, 0].min(), outline[:, 0].max()])
+    high, low = np.interp(ends, *terrain.points.T)
+    return math.degrees(math.atan2(high - low, ends[1] - ends[0]))
+
+
 def surfaces_below(terrain: Terrain, outline: Floats) -> list[str]:
     """Return the surface name of each terrain segment below an outline."""
     low, high = outline[:, 0].min(), outline[:, 0].max()

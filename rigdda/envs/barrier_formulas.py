@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Scene, Site, limit_equilibrium
 from rigdda.barriers import section
-from rigdda.barriers.base import ELEMENT, surfaces_below
+from rigdda.barriers.base import ELEMENT, base_inclination, surfaces_below
 from rigdda.barriers.gravity_wall import SLID
 from rigdda.envs.fence_checks import USE_ROUNDING, Action, Demand, FenceCheck
 from rigdda.envs.ritchie_ditch import RitchieDitch
@@ -160,7 +160,8 @@ class Base(NamedTuple):
     width : float
         Width of its base [m]; 0 for an embankment, which slides but does not overturn.
     friction : float
-        Coefficient of friction on the ground [-].
+        Horizontal resistance to sliding over the weight [-]: tan(phi - b) with the friction angle
+        phi and the inclination b of the ground.
     bearing : float
         Admissible pressure on the ground [Pa].
     restitution : float
@@ -187,10 +188,12 @@ class Base(NamedTuple):
         below = surfaces_below(scene.terrain, outline)
         weight = gravity * barrier.density * section(outline)
         touched = "rock" if "rock" in scene.surfaces else next(iter(scene.surfaces))
+        angle = min(scene.friction_deg(own, name) for name in below)
+        angle = max(angle - base_inclination(scene.terrain, outline), 0.0)
         return cls(
             weight=weight,
             width=barrier.thickness if isinstance(barrier, GravityWall) else 0.0,
-            friction=math.tan(math.radians(min(scene.friction_deg(own, name) for name in below))),
+            friction=math.tan(math.radians(angle)),
             bearing=PRESSURE_ON_ROCK if set(below) == {"rock"} else PRESSURE_ON_SOIL,
             restitution=scene.interface(touched, own).restitution or 0.0,
             gravity=gravity,

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import msgspec
+import numpy as np
 import pytest
 
 from rigdda import Ditch, Embankment, Fence, GravityWall, Site
@@ -13,6 +14,7 @@ from rigdda.agents.designers import rule
 from rigdda.agents.designers.menu import Menu
 from rigdda.app.barrier_checks import LayoutChecks, check_layout
 from rigdda.app.reports.design_report import check_notes
+from rigdda.barriers.base import base_inclination, surfaces_below
 from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.barrier_formulas import (
     PRESSURE_ON_ROCK,
@@ -20,6 +22,7 @@ from rigdda.envs.barrier_formulas import (
     BarrierCheck,
     Base,
     checks_of,
+    mean_scene,
 )
 from rigdda.envs.fence_checks import demand_at
 from rigdda.envs.ritchie_ditch import RitchieDitch
@@ -107,7 +110,10 @@ def test_checks_use_the_mean_strength_of_the_ground(name: str) -> None:
     assert isinstance(wall, GravityWall)
     angles = {surface.friction_deg for surface in site.surfaces.values()}
     base = Base.of(site, wall)
+    scene = mean_scene(site, (wall,))
+    assert scene.terrain is not None
     angle = math.degrees(math.atan(base.friction))
+    angle += base_inclination(scene.terrain, scene.outline(0))
     assert min(abs(angle - one) for one in angles) < 1e-9
     assert base.restitution in {s.restitution for s in site.surfaces.values()}
     assert any(surface.friction_sd_deg > 0.0 for surface in site.surfaces.values())
@@ -207,3 +213,25 @@ def test_an_existing_fence_keeps_blocks_off_and_is_checked() -> None:
     zone = site.barrier_zone
     bare = design_envelope.of(site, zone), design_envelope.of(stands, zone)
     assert bare[0].events == bare[1].events  # without a layout, nothing stands
+
+
+@pytest.mark.parametrize("name", ["talus", "verge", "narrow"])
+def test_a_structure_on_a_slope_slides_under_less_than_on_level_ground(name: str) -> None:
+    """From statics, the horizontal thrust is W tan(phi - b)."""
+    site = Site.load(name)
+    zone = site.barrier_zone
+    x = 0.5 * (zone.start + zone.end)
+    for barrier in (
+        GravityWall(x, 1.0, 1.0),
+        Embankment(x, 1.0, width=1.0, side_slope=0.5),
+    ):
+        scene = mean_scene(site, (barrier,))
+        assert scene.terrain is not None
+        outline = scene.outline(0)
+        ends = outline[:, 0].min(), outline[:, 0].max()
+        fall = -np.diff(np.interp(ends, *site.profile.points.T))[0] / (ends[1] - ends[0])
+        own = scene.barrier_surface if isinstance(barrier, GravityWall) else scene.fill
+        below = surfaces_below(scene.terrain, outline)
+        angle = math.radians(min(scene.friction_deg(own, one) for one in below))
+        right = math.tan(max(angle - math.atan(fall), 0.0))
+        assert Base.of(site, barrier).friction == pytest.approx(right, rel=1e-6, abs=1e-9)

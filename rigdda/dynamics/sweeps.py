@@ -9,6 +9,7 @@ import numpy as np
 from rigdda.dynamics.arrays import Rows
 from rigdda.dynamics.constants import (
     MOST_SWEEPS,
+    ROUNDING,
     SET_OF_SWEEPS,
     SUBSTEPS,
 )
@@ -311,7 +312,8 @@ def extrapolate(rows: Rows, active: int, most: float) -> float:
             slope += row[FLEXIBLE] * residue * change
             curvature += row[FLEXIBLE] * change * change
     failed = square > most
-    share = max(-slope / curvature, 0.0) if curvature > 0.0 and not failed else 0.0
+    slows = curvature > ROUNDING * square  # else the change of the residual is rounding
+    share = max(-slope / curvature, 0.0) if slows and not failed else 0.0
     for place in range(active):
         k = rows.active[place]
         row, fact = rows.row[k], rows.fact[k]

@@ -328,7 +328,8 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 hint = "give the least and the greatest volume, to which lognormal volumes are cut"
                 raise BadInput(f"{where}.volume", None, hint)
             assert self.volume_median is not None
-            if not limits[0] <= self.volume_median <= limits[1]:
+            rounding = 1.0 + 1e-9  # the limits are stored as areas
+            if not limits[0] / rounding <= self.volume_median <= limits[1] * rounding:
                 hint = f"give a median within the limits, {limits[0]:.3g} to {limits[1]:.3g} m3"
                 raise BadInput(f"{where}.volume_median", self.volume_median, hint)
 

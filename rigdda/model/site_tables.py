@@ -208,7 +208,8 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Width | None,
         about(
             "Width of the event along the road. Needed if several blocks come from a band. "
-            "The default is the square root of its area for a single block and 10 m for a mass. "
+            "The default is the square root of its area for a single block of a band, and 10 m "
+            "for a mass or for given blocks. "
             "The volume of a release is the sum of the cross-sections of its blocks times the "
             "width, and a fence has its energy class divided by the width per metre. For a few "
             "blocks that fall one after the other at the same place, give the size of a block.",

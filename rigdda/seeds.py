@@ -85,6 +85,14 @@ def first_event_generator(seed: int, events: int) -> np.random.Generator:
     return np.random.default_rng([seed, events, 2**31])
 
 
+def episode_seeds(rng: np.random.Generator, n: int) -> tuple[int, ...]:
+    """Return `n` different release seeds of an episode."""
+    drawn = dict.fromkeys(rng.integers(EPISODES, size=n).tolist())
+    while len(drawn) < n:  # of 10,000 seeds, two are equal once in 40 episodes
+        drawn |= dict.fromkeys(rng.integers(EPISODES, size=n - len(drawn)).tolist())
+    return tuple(drawn)
+
+
 def design_envelope_seed(seed: int) -> int:
     """Return the first release seed of a design envelope for a seed of a user."""
     return DESIGN_ENVELOPES + seed * LONGEST_STREAM

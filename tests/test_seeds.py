@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from rigdda import BadInput, seeds, sites
 from rigdda.envs.problem import events_of_seeds
-from rigdda.seeds import STREAMS, derive, design_envelope_seed, is_of_stream, release_seeds
+from rigdda.seeds import (
+    EPISODES,
+    STREAMS,
+    derive,
+    design_envelope_seed,
+    episode_seeds,
+    is_of_stream,
+    release_seeds,
+)
 
 FIRST = {
     "search": (9461343906, 17417326746, 3644310486),
@@ -65,3 +74,10 @@ def test_streams_of_release_seeds_never_meet() -> None:
     assert len(set.union(*drawn)) == sum(map(len, drawn)) == len(STREAMS) * 20 * 200
     assert release_seeds("search", 3, 8) == release_seeds("search", 3, 32)[:8]
     assert release_seeds("search", 3, 8, 5) == release_seeds("search", 3, 32)[5:13]
+
+
+def test_seeds_of_an_episode_are_different() -> None:
+    found = episode_seeds(np.random.default_rng(0), 100_000)
+    assert len(set(found)) == len(found) == 100_000
+    few = np.random.default_rng(3).integers(EPISODES, size=6).tolist()
+    assert episode_seeds(np.random.default_rng(3), 6) == tuple(few)

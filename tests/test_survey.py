@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from rigdda import BadInput, Site
 from rigdda.app import new_site
 from rigdda.app.new_site import SiteRequest, compose
+from rigdda.geometry import polygon_properties
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model.survey import Survey, parse_table, profile_of, read_survey, spikes
 from rigdda.sites.schema import schema
@@ -171,6 +172,9 @@ def test_ground_that_overhangs_gives_a_site(tmp_path):
     site = loaded(text)
     assert len(site.slope.points) == 7 and any("overhangs" in note for note in profile.notes)
     assert site.realise().blocks
+    (event,) = site.events  # its one block is as wide as the root of its area, not a strip of 10 m
+    area = abs(polygon_properties(np.array(site.sources[0].blocks[0]))[0])
+    assert event.width == pytest.approx(math.sqrt(area), abs=0.01)
 
 
 def test_grounds_sources_and_zone_are_where_they_were_given(tmp_path):

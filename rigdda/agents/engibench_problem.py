@@ -116,7 +116,7 @@ class RockfallBarriers(Problem[npt.NDArray[np.float64]]):
             If the design has another length, or an entry is not finite.
         """
         now, problem = self._configured(config)
-        seeds = release_seeds("search", self.seed or 0, now.releases)
+        seeds = release_seeds("verification", self.seed or 0, now.releases)
         return np.array([problem.evaluate(np.asarray(design), seeds).objective])
 
     def optimize(

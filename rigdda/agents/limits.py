@@ -8,11 +8,6 @@ take hours, determine a mean to a thousandth of the standard deviation, and need
 memory."""
 
 
-COMPARED_SITES = 10_000
-"""Largest number of random sites in a comparison. All of them are generated before the first
-search, which takes 1 ms each."""
-
-
 SEED = 2**32 - 1
 """Largest seed of a search or a training, which is the limit of the generators in numpy and torch.
 Seeds of releases may be larger."""

@@ -313,7 +313,8 @@ def compared(
 ) -> list[Compared]:  # fmt: skip
     """Return Z of the policy and of the simple rules on sites, on the same fresh releases.
 
-    Sites with an event of `MASS` blocks or more are left out.
+    Z of no barrier is known from the stored releases of a site. Sites with an event of `MASS`
+    blocks or more are left out.
 
     Raises
     ------

@@ -19,6 +19,7 @@ from rigdda import BadInput, Site
 from rigdda.app.value_origins import CHECK_DEFAULT, GIVEN, PLACEHOLDER, SURVEYED
 from rigdda.fields import described
 from rigdda.files import LONGEST_NAME, atomic
+from rigdda.geometry import polygon_properties
 from rigdda.ground.barrier_zone import BarrierZone
 from rigdda.ground.grounds import GROUNDS, USUAL
 from rigdda.ground.prices import DITCHES, Consequences, Prices
@@ -453,9 +454,8 @@ class _Draft:
         sources, events = [], []
         for name, span, sure in self.sources:
             blocks = self.overhangs and not self.request.sources
-            place: dict[str, tuple[Any, str]] = (
-                {"blocks": ([_block(self.profile.points, span)], sure)} if blocks else {}
-            )
+            block = _block(self.profile.points, span) if blocks else []
+            place: dict[str, tuple[Any, str]] = {"blocks": ([block], sure)} if blocks else {}
             usual = Source(band=(1.0, 2.0))
             values: dict[str, tuple[Any, str]] = {
                 "name": (name, sure),
@@ -471,7 +471,10 @@ class _Draft:
                         CHECK_DEFAULT,
                     )
             sources.append(Part("[[sources]]", Source, values))
-            size = {} if place else {"volume": (list(VOLUME), PLACEHOLDER)}
+            size: dict[str, tuple[Any, str]] = {"volume": (list(VOLUME), PLACEHOLDER)}
+            if place:  # a block as wide as the root of its area, not a strip of rock
+                area = abs(polygon_properties(np.array(block))[0])
+                size = {"width": (round(math.sqrt(area), 2), PLACEHOLDER)}
             law = (
                 {}
                 if place

@@ -14,7 +14,7 @@ from rigdda import Event, Site, Source, seeds
 from rigdda.app import value_origins
 from rigdda.app.reports.tables import empty_table
 from rigdda.app.reports.wording import surveyed
-from rigdda.barriers.fence import FENCE_CLASSES
+from rigdda.barriers.fence import FENCE_CLASSES, Fence
 from rigdda.geometry import polygon_properties
 from rigdda.model.forest import most_energy
 from rigdda.model.joints import spaced_area
@@ -159,7 +159,8 @@ def called(site: Site, surface: str) -> str:
 
 def _fences(site: Site) -> str:
     """Return which fences have room for their elongation, in words."""
-    room = site.road.start - site.rooms[0][0]
+    thickness = Fence(0.0, 2.0, energy_class=100).thickness
+    room = site.road.start - site.rooms[0][0] - thickness
     fit = [kj for kj, kind in FENCE_CLASSES.items() if kind.elongation <= room]
     if not fit:
         return f"no fence has room for its elongation: {room:.1f} m up to the road"

@@ -13,7 +13,7 @@ from statistics import NormalDist
 from rigdda import Layout, Outcome
 from rigdda.agents.designers.store import Store
 from rigdda.envs import DesignProblem, Evaluation, ensemble
-from rigdda.envs.comparison import Difference, difference
+from rigdda.envs.comparison import LEAST_PER_EVENT, Difference, difference
 from rigdda.envs.intervals import CONFIDENCE
 from rigdda.seeds import release_seeds
 
@@ -130,6 +130,8 @@ class Verification:
         if last.layout and last.ci[0] <= bare.ci[1] and last.ci[1] >= bare.ci[0]:
             return False
         others = [e.layout for e in evaluations if e.layout != last.layout]
+        if last.releases < LEAST_PER_EVENT * len(self.problem.site.events):
+            return False
         found = [self.difference(last.layout, other) for other in others]
         return all(is_clear(one, exact, len(self.stages)) for one in found)
 

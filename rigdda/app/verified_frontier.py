@@ -53,7 +53,7 @@ def with_frontier(
     fitting = [c.evaluation for c in cases[:-1] if problem.fits(c.evaluation.layout)]
     front: tuple[TriedLayout, ...] = ()
     if cases[-1].evaluation.targets != MISSED:
-        fitting = [e for e in fitting if e.targets == MET]
+        fitting = [e for e in fitting if judged(e.layout).targets == MET]
         searched = searched and bool(fitting)
     elif design_events(problem.site):
         known = with_verified_frontier(problem, result.tried, cases, judged)

@@ -90,7 +90,7 @@ def as_layout(layout: Any) -> Layout:
     Raises
     ------
     BadInput
-        If it is not a sequence of barriers, or has a mesh option twice.
+        If it is not a sequence of barriers, or has a mesh option or a removal twice.
     """
     what = "barriers: rigdda.Wall, GravityWall, Fence, Ditch, Embankment, Mesh or Removal"
     barriers: Layout = check.sequence("layout", layout, Barrier, what)
@@ -99,6 +99,9 @@ def as_layout(layout: Any) -> Layout:
         if isinstance(barrier, Mesh) and first.setdefault(barrier.option, i) != i:
             hint = f"use each mesh option at most once: barriers[{first[barrier.option]}] has it"
             raise BadInput(f"barriers[{i}].option", barrier.option, hint)
+        if isinstance(barrier, Removal) and barrier in barriers[:i]:
+            hint = "remove each existing barrier once"
+            raise BadInput(f"barriers[{i}].x", barrier.x, hint)
     return barriers
 
 

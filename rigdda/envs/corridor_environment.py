@@ -43,7 +43,7 @@ from rigdda.envs.replay_record import release_record
 from rigdda.envs.site_sampling import EpisodeSites, Place, Places, drawn_from
 from rigdda.model.corridor import is_corridor
 from rigdda.model.corridor import names as corridor_names
-from rigdda.seeds import EPISODES
+from rigdda.seeds import episode_seeds
 
 DEFAULT_SECTIONS = 12
 """Default number of sections of an episode."""
@@ -261,9 +261,7 @@ class CorridorDesign(LayoutEnv):
             math.exp((1.0 - share) * math.log(low) + share * math.log(high)) if low > 0.0 else low
         )
         self.budget = each * total
-        self._seeds = [
-            tuple(rng.integers(EPISODES, size=self.releases).tolist()) for _ in self.placed
-        ]
+        self._seeds = [episode_seeds(rng, self.releases) for _ in self.placed]
 
     def _drawn(self, rng: np.random.Generator) -> tuple[PlacedSection, ...]:
         """Return the sections of an episode in random order."""

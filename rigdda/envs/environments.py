@@ -28,7 +28,7 @@ from rigdda.envs.recorder import Recorder, Shown, Trigger
 from rigdda.envs.rendering import picture
 from rigdda.envs.replay_record import EpisodeRecord, Versions, as_json
 from rigdda.envs.site_sampling import EpisodeSites, Places, Slots
-from rigdda.seeds import EPISODES, OBSERVATIONS
+from rigdda.seeds import OBSERVATIONS, episode_seeds
 
 
 class Ask(NamedTuple):
@@ -282,7 +282,7 @@ class BarrierEnv(LayoutEnv):
         super().reset(seed=seed)
         self.open, self._seed = False, seed
         self.problem = self.sites.draw(self.np_random, options)
-        self.seeds = tuple(self.np_random.integers(EPISODES, size=self.releases).tolist())
+        self.seeds = episode_seeds(self.np_random, self.releases)
 
     def start(self, observed: Sample) -> tuple[Observation, Info]:
         """Start the drawn episode and return its first observation and info."""

@@ -208,7 +208,8 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Width | None,
         about(
             "Width of the event along the road. Needed if several blocks come from a band. "
-            "The default is the square root of its area for a single block and 10 m for a mass. "
+            "The default is the square root of its area for a single block of a band, and 10 m "
+            "for a mass or for given blocks. "
             "The volume of a release is the sum of the cross-sections of its blocks times the "
             "width, and a fence has its energy class divided by the width per metre. For a few "
             "blocks that fall one after the other at the same place, give the size of a block.",
@@ -328,7 +329,8 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 hint = "give the least and the greatest volume, to which lognormal volumes are cut"
                 raise BadInput(f"{where}.volume", None, hint)
             assert self.volume_median is not None
-            if not limits[0] <= self.volume_median <= limits[1]:
+            rounding = 1.0 + 1e-9  # the limits are stored as areas
+            if not limits[0] / rounding <= self.volume_median <= limits[1] * rounding:
                 hint = f"give a median within the limits, {limits[0]:.3g} to {limits[1]:.3g} m3"
                 raise BadInput(f"{where}.volume_median", self.volume_median, hint)
 

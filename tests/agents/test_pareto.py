@@ -40,8 +40,10 @@ def test_the_finalists_spread_over_the_front_and_hold_its_best() -> None:
     chosen = pareto.finalists(VALLEY, tried, 6)
     assert 5 <= len(chosen) <= 6
     capital = [e.capital for e in chosen]
-    assert capital == sorted(capital) and {tried[0].capital, tried[-1].capital} <= set(capital)
-    assert min(tried, key=lambda e: e.objective) in chosen
+    assert capital[1:] == sorted(capital[1:]) and {tried[0].capital, tried[-1].capital} <= set(
+        capital
+    )
+    assert min(tried, key=lambda e: e.objective) == chosen[0]  # a final may take the first only
 
 
 @pytest.mark.parametrize("simulations", [8, 400])

@@ -2,6 +2,7 @@
 
 import csv
 import time
+from types import SimpleNamespace
 
 import msgspec
 import pytest
@@ -113,3 +114,15 @@ def test_more_releases_after_a_stop_are_computed():
     assert not release.running and release.fault == ""
     assert stopped + 30 <= release.done < 1000
     assert release.asked == release.done == len(release.falls)
+
+
+def test_blocks_of_a_release_are_not_independent():
+    alike = [SimpleNamespace(end=end, seed=k) for k, end in enumerate(ENDS.values())]
+    many = [one for one in alike for _ in range(50)]
+    wide, narrow = shares(alike), shares(many)
+    for end in ENDS.values():
+        assert narrow[end].probability == pytest.approx(wide[end].probability)
+        assert narrow[end].releases == 50 * wide[end].releases
+        assert narrow[end].high - narrow[end].low == pytest.approx(
+            wide[end].high - wide[end].low, rel=0.1
+        )

@@ -1,7 +1,10 @@
 """Parts of a site that the page adds and removes."""
 
+from pathlib import Path
+
 import pytest
 
+import rigdda
 from rigdda import BadInput, Site, sites
 from rigdda.app.page import parts
 from rigdda.model.site_tables import Stretch
@@ -102,3 +105,21 @@ def test_events_are_copied_under_names_that_are_free():
         assert site.events[-1].name.endswith(str(number))
     fewer = Site.parse(parts.without_event(text, len(site.events) - 1), "site.toml")
     assert fewer.events == site.events[:-1]
+
+
+def test_factors_of_meshes_follow_their_events() -> None:
+    text = Path(rigdda.__file__).parent.joinpath("sites/verge.toml").read_text()
+    site = Site.load("verge")
+    (mesh,) = [m for m in site.meshes if site.events[0].name in m.factors][:1]
+    renamed = Site.parse(parts.renamed_event(text, 0, "stones"), "site.toml")
+    assert renamed.events[0].name == "stones"
+    assert renamed.mesh(mesh.name).factors["stones"] == mesh.factors[site.events[0].name]
+    fewer = Site.parse(parts.without_event(text, 0), "site.toml")
+    assert site.events[0].name not in fewer.mesh(mesh.name).factors
+
+
+def test_events_that_a_file_leaves_out_are_written_first() -> None:
+    text = Path(rigdda.__file__).parent.joinpath("sites/ritchie-35.toml").read_text()
+    site = Site.load("ritchie-35")
+    more = Site.parse(parts.with_event(text, site), "site.toml")
+    assert len(more.events) == len(site.events) + 1 and more.events[0] == site.events[0]

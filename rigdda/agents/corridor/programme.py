@@ -133,7 +133,9 @@ def optimum(
     limits = [cp.sum(x) == 1 for x in chosen]
     limits.append(total(options.costs) <= budget * (1.0 + BUDGET_ROUNDING))
     if yearly is not None:
-        limits.append(total(options.annual) <= yearly * (1.0 + BUDGET_ROUNDING))
+        least_annual = options.total(options.nothing, options.annual)  # of existing barriers
+        most = max(yearly, least_annual) * (1.0 + BUDGET_ROUNDING)
+        limits.append(total(options.annual) <= most)
     if any(own.any() for own in options.missed):
         least = _solve(cp.Problem(cp.Minimize(total(options.missed)), limits))
         limits.append(total(options.missed) <= least + 1e-6)

@@ -88,13 +88,14 @@ def front(evaluations: Iterable[Evaluation]) -> tuple[Evaluation, ...]:
 def finalists(
     problem: DesignProblem, evaluations: Sequence[Evaluation], n: int
 ) -> list[Evaluation]:
-    """Return at most `n` finalists: the best of the front and others spread evenly over it."""
+    """Return at most `n` finalists: the best of the front, then others spread evenly over it."""
     found = front(evaluations)
-    if len(found) <= n:
-        return list(found)
     best = min(range(len(found)), key=lambda i: score(problem, found[i]))
-    spread = np.linspace(0, len(found) - 1, max(0, n - 1)).round().astype(int).tolist()
-    return [found[i] for i in sorted({best, *spread})[:n]]
+    others = [i for i in range(len(found)) if i != best]
+    if len(found) > n:
+        spread = np.linspace(0, len(found) - 1, max(0, n - 1)).round().astype(int).tolist()
+        others = [i for i in spread if i != best]
+    return [found[i] for i in [best, *others][:n]]
 
 
 def _propose(problem: DesignProblem, first: list[Layout], seed: int) -> Proposals:

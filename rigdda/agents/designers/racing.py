@@ -257,6 +257,9 @@ def allocation(
             shares[name] *= min(1.0, max(LEFT, float(np.mean(seen)) / nothing.spread(name)))
     whole = sum(shares.values())
     counts = {name: int(n * share / whole) for name, share in shares.items()}  # never more than n
+    if max(counts.values()) <= 2:  # many events: the most important ones have three
+        order = sorted(shares, key=lambda name: -shares[name])
+        counts = {name: 3 * (place < n // 3) for place, name in enumerate(order)}
     counts = {name: count if count > 2 else 0 for name, count in counts.items()}
     return _with_floors(counts, _floors(problem, n), n)
 

@@ -37,5 +37,5 @@ def design(
     surrogate = forecast_pool(ledger, menu, unsearched(problem, menu))
     best = surrogate.best(1)
     forecast = surrogate.value()[surrogate.place[best[0]]] if best else 1.0
-    layout = best[0] if forecast < 1.0 or surrogate.has_targets else ()
+    layout = best[0] if best and (forecast < 1.0 or surrogate.has_targets) else ()
     return ledger.result(ledger.evaluate(layout, "report", min(REPORT_RELEASES, ledger.left)))

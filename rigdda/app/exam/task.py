@@ -294,18 +294,22 @@ def make_task(order: TaskOrder, line: Line) -> Task | CorridorTask:
     return Task(problem, order.name, order.budget, order.seed, line)
 
 
+SIMULATE = catalogue.ensemble
+"""Simulation of releases without barriers that are not counted."""
+
+
 def count_crossings(tasks: Sequence[Task]) -> None:
     """Let the designers of the package take the releases without barriers of tasks from them.
 
-    These releases are then counted. Those of other sites are simulated as before.
+    These releases are then counted. Those of other sites, also of earlier tasks, are simulated and
+    not counted.
     """
     known = {own.problem.key: own for own in tasks}
-    before = catalogue.ensemble
 
     def ask(
         site: Site, seeds: Mapping[str, Sequence[int]], stations: NDArray[np.float64]
     ) -> catalogue.CrossingEnsemble:
         task = known.get(fingerprint(site))
-        return before(site, seeds, stations) if task is None else task.crossings(seeds, stations)
+        return SIMULATE(site, seeds, stations) if task is None else task.crossings(seeds, stations)
 
     catalogue.ensemble = ask

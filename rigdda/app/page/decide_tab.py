@@ -11,7 +11,7 @@ import panel as pn
 from bokeh.models import ColumnDataSource, HoverTool, TapTool
 from bokeh.plotting import figure
 
-from rigdda import BadInput, Layout
+from rigdda import BadInput, Layout, Site
 from rigdda.agents.designers import DEFAULT, DESIGNERS
 from rigdda.app.page import placing
 from rigdda.app.page.barriers_tab import NAMES, alternatives_html, shown
@@ -68,7 +68,8 @@ class DecideTab:
         self._found: list[Tried] = []
         self._count = 0
         self._listed: list[Layout] = []
-        self._meets: dict[Layout, bool] = {}
+        self._meets: dict[Layout, bool] = {}  # on the site `_checked`
+        self._checked: Site | None = None
         self._bound: list[Bound] = []
         self._structure: Any = None
         self._designer = pn.widgets.Select(
@@ -185,9 +186,12 @@ class DecideTab:
         BadInput
             If no kind of barrier is chosen, or there is no site.
         """
-        site = self.project.site
+        _ = self.project.site  # raises an error without a site
         if not self._kinds.value:
             raise BadInput("kinds", [], "choose at least one kind of barrier")
+        if self._budget.value is None or self._verify.value is None:
+            hint = "give the numbers of releases of the search and of the verification"
+            raise BadInput("releases", None, hint)
         asked = ["--designer", self._designer.value, "--kinds", ",".join(self._kinds.value)]
         asked += ["--budget", str(self._budget.value), "--verify", str(self._verify.value)]
         asked += ["--ground-samples", "0"]
@@ -198,7 +202,6 @@ class DecideTab:
                 asked += [option, f"{one.value:g}"]
         key = hashlib.sha256("\0".join([self.project.current.site, *asked]).encode()).hexdigest()
         out = self.project.folder / f"design-{key[:8]}"
-        assert site.name
         return ["design", str(self.project.where.site), *asked, "--out", str(out)]
 
     def _look(self) -> None:
@@ -228,8 +231,10 @@ class DecideTab:
 
     def _met(self, layout: Layout) -> bool:
         """Return whether all barriers of a layout meet their checks."""
+        site = self.project.site
+        if site != self._checked:
+            self._checked, self._meets = site, {}
         if layout not in self._meets:
-            site = self.project.site
             problem = DesignProblem(
                 site, checks="required", max_barriers=MOST_BARRIERS, kinds=placing.kinds_for(site)
             )

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import traceback
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,9 +119,24 @@ def falls_of(site: Site, found: Trajectories) -> list[Fall]:
 
 
 def shares(falls: Sequence[Fall]) -> dict[str, Estimate]:
-    """Return the share of blocks with each end, with its interval."""
-    ends = [fall.end for fall in falls]
-    return {end: estimate(ends.count(end), len(ends)) for end in ENDS.values()}
+    """Return the share of blocks with each end, with its interval.
+
+    Blocks of one release are not independent: a share has the interval of as many independent
+    blocks as have its variance between releases (Kish 1965), at most that of all blocks.
+    """
+    found = {}
+    seeds = np.unique([fall.seed for fall in falls], return_inverse=True)[1]
+    sizes = np.bincount(seeds).astype(np.float64)
+    for end in ENDS.values():
+        own = np.array([fall.end == end for fall in falls])
+        share, count = float(own.mean()) if len(own) else math.nan, len(own)
+        off = np.bincount(seeds, own - share) if 0.0 < share < 1.0 else np.zeros(len(sizes))
+        between = float(off @ off)
+        if between > 0.0:
+            count = max(1, min(count, round(share * (1.0 - share) * len(own) ** 2 / between)))
+        one = estimate(round(share * count) if count else 0, count)
+        found[end] = replace(one, probability=share, releases=len(own)) if count else one
+    return found
 
 
 def nearest(falls: Sequence[Fall], x: float, y: float, reach: float) -> Fall | None:
@@ -181,7 +197,7 @@ class Release:
         with self._lock:
             self.asked += count
             if not self.running:
-                self.running = True
+                self.running, self.fault = True, ""
                 self._thread = threading.Thread(target=self._work, name="releases", daemon=True)
                 self._thread.start()
 

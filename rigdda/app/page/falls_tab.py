@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import shlex
 import threading
+import traceback
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -107,6 +108,9 @@ class Passed:
             self.found = passing
         except Error as error:
             self.fault = str(error)
+        except Exception as error:  # shown on the page
+            traceback.print_exc()
+            self.fault = f"{type(error).__name__}: {error}"
 
 
 class FallsTab:
@@ -345,7 +349,7 @@ class FallsTab:
     def _collect(self) -> None:
         """Compute what passes the collector, of the releases that are shown."""
         release = self._release
-        if release is None or not release.done or release.running:
+        if release is None or not release.done or release.running or self._station.value is None:
             return
         self._passed = Passed(
             self.project.site, self._layout, self._event.value, release.done,
@@ -464,6 +468,8 @@ class FallsTab:
 
     def _show_line(self) -> None:
         site = self.project.site
+        if self._station.value is None:
+            return
         x = float(self._station.value)
         low, high = site.slope.points[0][0], site.slope.points[-1][0]
         if not low < x < high:
@@ -506,14 +512,10 @@ class FallsTab:
         return float(high - low)
 
     def _replay(self, fall: Fall) -> None:
-        site = self.project.site
         self._replayed = fall
         self._hits.data = dict(zip("xy", fall.impacts, strict=True))
-        ground = [site.profile.height(x) for x in np.clip(
-            fall.x, site.slope.points[0][0], site.slope.points[-1][0]).tolist()]  # fmt: skip
-        self._track.data = {
-            "x": fall.x, "energy": fall.energy, "height": fall.y - np.array(ground),
-        }  # fmt: skip
+        ground = np.interp(fall.x, *fall.found.ground.points.T)  # with earthworks
+        self._track.data = {"x": fall.x, "energy": fall.energy, "height": fall.y - ground}
         _fit(self._tracks, fall.x, fall.energy)
         self._above.end = HEAD * (float(self._track.data["height"].max()) or 1.0)
         self._tracks.visible = True

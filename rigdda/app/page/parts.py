@@ -84,6 +84,7 @@ def with_band(text: str, site: Site) -> str:
     The band lies in the middle of the longest part of the slope above its toe without a band.
     """
     bands = [k for k, source in enumerate(site.sources) if source.band is not None]
+    text = _with_events(text, site)
     name = _free("band", (source.name for source in site.sources))
     source: dict[str, Any] = _table(text, "sources", bands[-1]) if bands else {}
     source |= {"name": name, "band": list(_room_for_band(site))}
@@ -113,7 +114,7 @@ def without_source(text: str, site: Site, place: int) -> str:
     name = site.sources[place].name
     for k in reversed(range(len(site.events))):
         if site.events[k].source == name:
-            text = edits.without(text, ("events", k))
+            text = without_event(text, k)
     return edits.without(text, ("sources", place))
 
 
@@ -128,15 +129,41 @@ def renamed_source(text: str, site: Site, place: int, name: str) -> str:
 
 def with_event(text: str, site: Site) -> str:
     """Return the text with another event like the last one."""
-    last = len(site.events) - 1
+    text, last = _with_events(text, site), len(site.events) - 1
     event = _table(text, "events", last)
     event["name"] = _free(site.events[last].name, site.event_names)
     return edits.with_table(text, "events", event)
 
 
 def without_event(text: str, place: int) -> str:
-    """Return the text without an event."""
+    """Return the text without an event, and without the factors of meshes on its rate."""
+    name = _table(text, "events", place)["name"]
+    for k, mesh in enumerate(tomlkit.parse(text).unwrap().get("meshes", [])):
+        if name in mesh.get("factors", {}):
+            text = edits.without(text, ("meshes", k, "factors", name))
     return edits.without(text, ("events", place))
+
+
+def renamed_event(text: str, place: int, name: str) -> str:
+    """Return the text with another name of an event, which the factors of meshes follow."""
+    before = _table(text, "events", place)["name"]
+    for k, mesh in enumerate(tomlkit.parse(text).unwrap().get("meshes", [])):
+        if before in mesh.get("factors", {}):
+            own = {name if key == before else key: v for key, v in mesh["factors"].items()}
+            text = edits.with_value(text, ("meshes", k, "factors"), own)
+    return edits.with_value(text, ("events", place, "name"), name)
+
+
+def _with_events(text: str, site: Site) -> str:
+    """Return the text with the events of the site, which a file may leave out."""
+    if "events" in tomlkit.parse(text):
+        return text
+    for event in site.events:
+        values = msgspec.to_builtins(event)
+        text = edits.with_table(
+            text, "events", {key: value for key, value in values.items() if value is not None}
+        )
+    return text
 
 
 def _table(text: str, name: str, place: int) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from rigdda.app.page.section import HandleSource, Section, ground_colour
 from rigdda.app.page.theme import TALL
 from rigdda.app.reports.wording import survey_grid
 from rigdda.app.value_origins import accepted
-from rigdda.ground.grounds import GROUNDS
+from rigdda.ground.grounds import GROUNDS, Ground
 from rigdda.model.survey import spikes
 
 if TYPE_CHECKING:
@@ -324,11 +324,14 @@ class SlopeTab:
 
     def _ground_row(self, name: str, known: bool) -> list[Any]:
         """Return the choice of the ground of a surface, and what it is."""
-        path = ("surfaces", name, "ground")
         library = {one.replace("_", " "): one for one in GROUNDS}
         options = library if known else {"own values": None} | library
         bound = choice(
-            f"Ground of {name}", options, partial(self._ground, name), self._set(path, name), 330
+            f"Ground of {name}",
+            options,
+            partial(self._ground, name),
+            partial(self._set_ground, name),
+            330,
         )
         told = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 8))
         self._bound += [bound, Words(told, partial(self._ground_words, name))]
@@ -399,9 +402,7 @@ class SlopeTab:
     def _event(self, i: int, sources: tuple[str, ...], place: int | None) -> list[Any]:
         """Return the inputs for an event; `place` is that of its band if it has sizes of blocks."""
         get = partial(_value, self.project, ("events", i, "name"))
-        name = self._name(
-            "Name of the event", get, self._set(("events", i, "name"), "the name of an event")
-        )
+        name = self._name("Name of the event", get, partial(self._rename_event, i))
         source = choice(
             "Rock from", list(sources), partial(_value, self.project, ("events", i, "source")),
             self._set(("events", i, "source"), "the source of an event"), 230,
@@ -443,8 +444,11 @@ class SlopeTab:
         self._bound += volumes
         shape = [
             self._number("Exponent of volumes [-]", ("events", i, "exponent"), step=0.1, width=150),
-            self._number("Longest over broadest [-]", ("sources", place, "aspect", 1), step=0.1,
-                         width=170),
+            number(
+                "Longest over broadest [-]",
+                partial(_value, self.project, ("sources", place, "aspect", 1)),
+                partial(self._set_aspect, place), 0.1, 170, start=1.0,
+            ),
         ]  # fmt: skip
         return [pn.Row(*(one.widget for one in volumes)), pn.Row(*shape)]
 
@@ -461,6 +465,21 @@ class SlopeTab:
         both[k] = volume
         values: dict[Path_, Any] = {("events", i, "area"): None, ("events", i, "volume"): both}
         self._change(values, "set the volume of blocks")
+
+    def _set_ground(self, name: str, ground: str | None) -> None:
+        """Set the ground of a surface; values of its own would hide those of the ground."""
+        values: dict[Path_, Any] = {("surfaces", name, "ground"): ground}
+        if ground is not None:
+            values |= {("surfaces", name, field): None for field in Ground._fields[1:]}
+        self._change(values, f"set the ground of {name}")
+
+    def _rename_event(self, i: int, name: str) -> None:
+        self._edit(lambda old: parts.renamed_event(old, i, name), "set the name of an event")
+
+    def _set_aspect(self, place: int, longest: float) -> None:
+        least = self.project.site.sources[place].aspect[0]
+        values: dict[Path_, Any] = {("sources", place, "aspect"): [min(least, longest), longest]}
+        self._change(values, "set the shape of blocks")
 
     def _change(self, values: dict[Path_, Any], words: str) -> None:
         self._edit(lambda old: edits.with_values(old, values), words)

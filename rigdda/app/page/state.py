@@ -362,6 +362,7 @@ class Project:
         with self.lock:
             at = self._at + way
             if 0 <= at < len(self._steps):
+                self._parse(self._steps[at])
                 self._write(self._steps[at])
                 self._at = at
                 self._write_history()

@@ -255,9 +255,7 @@ def demand_rows(problem: DesignProblem, envelope: DesignEnvelope) -> Iterator[di
             "height_low_m": high.height.low,
             "height_high_m": high.height.high,
             "needed_height_m": high.needed_height(),
-            "classes_that_fit_kJ": " ".join(
-                map(str, fit if demand.covered >= rule.COVERED else [])
-            ),
+            "classes_that_fit_kJ": " ".join(map(str, fit)),
         }
 
 

@@ -131,7 +131,7 @@ class PassageEnvelope:
 def trajectories(site: Site, layout: Layout, event: str, seeds: Sequence[int]) -> EventTrajectories:
     """Simulate releases of an event in threads on all cores, for their trajectories.
 
-    The seeds are used in order until `DRAWN` blocks have been released.
+    The seeds are used in order until `DRAWN_TRAJECTORIES` blocks have been released.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def trajectories(site: Site, layout: Layout, event: str, seeds: Sequence[int]) -
     with ThreadPoolExecutor() as pool:
         runs = [first, *pool.map(lambda seed: _run(site, layout, event, seed), more)]
     ways = [run.poses[:, i, :2] for run in runs for i in range(run.poses.shape[1])]
-    return EventTrajectories(event, tuple(ways[:: max(1, len(ways) // DRAWN_TRAJECTORIES)]))
+    return EventTrajectories(event, tuple(ways[:: max(1, -(-len(ways) // DRAWN_TRAJECTORIES))]))
 
 
 def _run(site: Site, layout: Layout, event: str, seed: int) -> Run:
@@ -1024,7 +1024,7 @@ def _needed_heights(axes: Axes, problem: DesignProblem, rows: Sequence[Mapping[s
 def _class_stretches(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
     """Draw for each class where it satisfies the rule, and where only its energy suffices."""
     x, energy = _values(rows, "x_m"), _values(rows, "demanded_energy_kJ")
-    step = float(np.diff(x).min(initial=1.0)) if len(x) > 1 else 1.0
+    step = float(np.diff(x).min()) if len(x) > 1 else 1.0
     for i, name in enumerate(CLASSES):
         fits = np.array([f"{name}" in row["classes_that_fit_kJ"].split() for row in rows])
         strong = "its energy suffices, but not height or clearance"

@@ -63,7 +63,7 @@ def placeholders(text: str) -> list[str]:
 
 
 def marks_of(path: str | os.PathLike[str]) -> list[Mark]:
-    """Return the values that are marked as placeholders in a site file; none of a name."""
+    """Return the values that are marked as placeholders in a site file; none if it is no file."""
     file = Path(path)
     if not file.is_file():
         return []

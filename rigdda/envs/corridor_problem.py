@@ -175,7 +175,7 @@ class CorridorProblem:
         """Return the evaluation of the corridor from those of its sections.
 
         Sections without barriers do not contribute to the gain or to its interval. The errors of
-        sections of the same site on the same releases are added, the others are independent.
+        sections of the same site on the same releases are added; all others are independent.
         """
         lengths = self.lengths.tolist()
         rows = list(zip(lengths, self.problems, evaluations, strict=True))

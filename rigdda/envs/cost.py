@@ -101,7 +101,7 @@ class Evaluation:
         Number of releases, and how many of them were simulated for this evaluation; the others came
         from the outcome cache. `simulated` is ignored in comparisons.
     seconds : float
-        Processor time of the simulations [s], NaN in an executor; ignored in comparisons.
+        Processor time of the simulations [s], NaN if an executor ran them; ignored in comparisons.
     risk : Risk or None
         Risk to the traffic; None if the site has no `[traffic]`.
     """

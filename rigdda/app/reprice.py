@@ -436,8 +436,8 @@ def _without(marked: Sequence[Mark], site: Site, settings: Mapping[str, Value]) 
         if isinstance(getattr(site, top), tuple):
             place, keys = _named(site, path, value, top)
             table, key = top, keys[0]
-        given.add(Mark(table, place, key))
-    return tuple(mark for mark in marked if mark not in given)
+        given.add(Mark(table, place, key).stored)
+    return tuple(mark for mark in marked if mark.stored not in given)
 
 
 def failed_checks(

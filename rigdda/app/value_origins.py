@@ -19,6 +19,10 @@ CHECK_DEFAULT = "default: check"
 """Origins of values."""
 
 
+STORED_KEYS = {"return_period": "rate", "section_length": "rate", "volume": "area"}
+"""Keys of events that are stored as others."""
+
+
 class Mark(NamedTuple):
     """A value that is marked as a placeholder.
 
@@ -35,6 +39,11 @@ class Mark(NamedTuple):
     table: str
     place: int
     key: str
+
+    @property
+    def stored(self) -> Mark:
+        """The same with the key that `Site.save` writes for it."""
+        return self._replace(key=STORED_KEYS.get(self.key, self.key))
 
     @property
     def path(self) -> str:
@@ -74,7 +83,8 @@ def save(site: Site, path: Path, marked: Collection[Mark]) -> None:
     """Write a site file in which some values are marked as placeholders."""
     site.save(path)
     if marked:
-        text = with_marks(path.read_text(encoding="utf-8"), marked)
+        stored = {mark.stored for mark in marked}
+        text = with_marks(path.read_text(encoding="utf-8"), stored)
         with atomic(path) as part:
             part.write_text(text, encoding="utf-8")
 

@@ -53,8 +53,11 @@ def with_frontier(
     fitting = [c.evaluation for c in cases[:-1] if problem.fits(c.evaluation.layout)]
     front: tuple[TriedLayout, ...] = ()
     if cases[-1].evaluation.targets != MISSED:
-        fitting = [e for e in fitting if judged(e.layout).targets == MET]
-        searched = searched and bool(fitting)
+        if not searched:
+            return result, front, False
+        open_ = [e for e in fitting if e.targets != MISSED]
+        fitting = [e for e in open_ if judged(e.layout).targets == MET]
+        searched = bool(fitting)
     elif design_events(problem.site):
         known = with_verified_frontier(problem, result.tried, cases, judged)
         result, front = replace(result, tried=known), frontier(known)

@@ -33,8 +33,8 @@ embankments of reinforced soil held impacts that displaced them by more (Peila e
 Landslides 4, 255-265, from memory)."""
 
 STEEPEST = 80.0
-"""Largest angle of friction and inclination together that is counted [deg]. A structure cannot slide
-onto ground that rises steeply in the direction of the thrust."""
+"""Largest angle of friction and inclination together that is counted [deg]. A structure cannot
+slide onto ground that rises steeply in the direction of the thrust."""
 
 SLIDING_SAFETY, OVERTURNING_SAFETY = 1.5, 2.0
 """Factors of safety that are customary under permanent loads [-]. Under the design impact, which

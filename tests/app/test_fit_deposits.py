@@ -71,7 +71,7 @@ def test_blocks_of_a_deposit_count_as_many_as_are_independent() -> None:
     assert twice == pytest.approx(2 * alone, abs=1)
     group = fit.independent_blocks(SITE, one._replace(event="group", releases=30), range(40))
     assert 0.9 * alone < group < 6 * 30
-    with pytest.raises(BadInput, match="in a column releases"):
+    with pytest.raises(BadInput, match="in the column releases"):
         fit.independent_blocks(SITE, one._replace(releases=1), range(100))
 
 

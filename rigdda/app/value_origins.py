@@ -20,7 +20,7 @@ CHECK_DEFAULT = "default: check"
 
 
 STORED_KEYS = {"return_period": "rate", "section_length": "rate", "volume": "area"}
-"""Keys of events that are stored as others."""
+"""Keys of the table "events" that are stored as others."""
 
 
 class Mark(NamedTuple):
@@ -43,6 +43,8 @@ class Mark(NamedTuple):
     @property
     def stored(self) -> Mark:
         """The same with the key that `Site.save` writes for it."""
+        if self.table != "events":
+            return self
         return self._replace(key=STORED_KEYS.get(self.key, self.key))
 
     @property

@@ -257,7 +257,10 @@ def test_values_read_back_belong_to_their_observations(tmp_path: Path) -> None:
     runs = DataSet(OBSERVED_RUN_OUT, "block", np.array(stops, dtype=np.float64))
     sets = {one.name: one, runs.name: runs}
     parameters = [parse(PATHS[0])]
-    quiet = lambda done, words: None  # noqa: E731
+
+    def quiet(done: float, words: str) -> None:
+        """Show no progress."""
+
     fits = [fit.fit(SITE, sets, parameters, 8, 20, 3, quiet, out=out) for out in (None, tmp_path)]
     again = fit.fit(SITE, sets, parameters, 8, 20, 3, quiet, out=tmp_path)
     for other in (fits[1], again):

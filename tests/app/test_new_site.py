@@ -795,6 +795,8 @@ def test_placeholders_stay_marked_in_files_that_commands_write(tmp_path: Path) -
         mark("events", 0, "volume"),
     ]
     value_origins.save(site, tmp_path / "site.toml", kept)
+    length = mark("traffic", 0, "section_length")
+    assert length.stored == length
     found = set(value_origins.marks_of(tmp_path / "site.toml"))
     assert found == {mark("slope", 0, "toe"), mark("events", 1, "rate"), mark("events", 0, "area")}
     assert Site.load(tmp_path / "site.toml") == site

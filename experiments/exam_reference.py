@@ -1,4 +1,4 @@
-"""References of the exam: layouts found with 4,000 releases per section, and random layouts.
+"""References of the exam: layouts found by a long search, and random layouts.
 
 `python -m experiments.exam_reference [--spec FILE] [--releases N]`. With fewer releases than the
 specification asks for, references are provisional, and a later run with more replaces them.

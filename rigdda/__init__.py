@@ -7,7 +7,7 @@ import lazy_loader
 
 __version__ = "0.2.0"
 
-MECHANICS = "2"
+MECHANICS = "3"
 """Version of everything that determines results: the mechanics, what is drawn from seeds, the
 generator of sites, costs and statistics.
 

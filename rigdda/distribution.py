@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -39,8 +40,8 @@ GLANCE = 5.0
 _executors: list[Executor] = []
 """Executors in use, the current one last."""
 
-_remote = False
-"""Whether this process is a worker: its releases then use a single thread."""
+_remote = threading.local()
+"""`on`: whether this thread works for an executor; its releases then use a single thread."""
 
 
 @contextmanager
@@ -73,7 +74,7 @@ def current() -> Executor | None:
 
 def threads() -> int:
     """Return the number of threads for the releases of this process: one in a worker."""
-    return 1 if _remote else os.cpu_count() or 1
+    return 1 if getattr(_remote, "on", False) else os.cpu_count() or 1
 
 
 @contextmanager
@@ -261,9 +262,8 @@ class _Worker:
 
     def __call__(self, item: Any) -> Any:
         """Return the result of the function, with one thread and without an executor."""
-        global _remote
-        before, _remote = _remote, True
+        before, _remote.on = getattr(_remote, "on", False), True
         try:
             return self.function(item)
         finally:
-            _remote = before
+            _remote.on = before

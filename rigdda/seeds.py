@@ -1,9 +1,9 @@
 """Seeds: how every random number of a simulation is derived from whole numbers.
 
 A *release seed* fixes the random properties of one release, see `generator`. Each use has release
-seeds of its own. Only those of designers are spread over all numbers below 6 x 2**32, so that one
-of them may coincide with a seed of another use; with 20,000 releases of each, this is expected
-for less than one release in fifty designs.
+seeds of its own. The exception is the designers: their seeds are spread over all numbers below
+6 x 2**32, so that one of them may coincide with a seed of another use. With 20,000 releases of
+each use, fewer than one design in fifty is expected to have such a release.
 
 =================  =============================================================================
 use                release seeds

@@ -146,7 +146,7 @@ def archive(
             ArchivedReleases(to_tables(own.layout), list(own.seeds), list(own.outcomes))
             for own in gathered(store)
         ],
-        placeholders=list(placeholders),
+        placeholders=list(dict.fromkeys(mark.stored for mark in placeholders)),
     )
 
 

@@ -436,8 +436,8 @@ def _without(marked: Sequence[Mark], site: Site, settings: Mapping[str, Value]) 
         if isinstance(getattr(site, top), tuple):
             place, keys = _named(site, path, value, top)
             table, key = top, keys[0]
-        given.add(Mark(table, place, key))
-    return tuple(mark for mark in marked if mark not in given)
+        given.add(Mark(table, place, key).stored)
+    return tuple(mark for mark in marked if mark.stored not in given)
 
 
 def failed_checks(
@@ -581,10 +581,10 @@ def choose(
     chosen only because its few releases happen to be favourable.
 
     If none meets the targets, the choice is among the verified layouts with barriers, or among all
-    if there are none. Those that are shown to miss a target rank behind all others. Of the rest, it
-    is the one that misses the targets least. If the probabilities of none of
-    them are within the targets, others that are not shown to miss them by more and have at least
-    half as many releases compete with it by Z, see `protocol.best_of_finals`.
+    if there are none. Those that are shown to miss a target are left out, unless all are. The
+    choice is the layout that misses the targets least. If the probabilities of none of them are
+    within the targets, others that are not shown to miss them by more and have at least half as
+    many releases compete with it by Z, see `protocol.best_of_finals`.
     """
     field = [c for c in candidates if c.over <= 0.0]
     if not field:

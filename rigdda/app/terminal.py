@@ -537,7 +537,8 @@ def warn_of_placeholders(site: str) -> None:
 def note_placeholders(count: int) -> None:
     """Print a note if a site file marks some values as placeholders."""
     if count:
-        note(f"the site file marks {count} values as placeholders to replace")
+        words = "1 value as a placeholder" if count == 1 else f"{count} values as placeholders"
+        note(f"the site file marks {words} to replace")
 
 
 TRAFFIC_HEADING = (

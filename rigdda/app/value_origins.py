@@ -19,6 +19,10 @@ CHECK_DEFAULT = "default: check"
 """Origins of values."""
 
 
+STORED_KEYS = {"return_period": "rate", "section_length": "rate", "volume": "area"}
+"""Keys of the table "events" that are stored as others."""
+
+
 class Mark(NamedTuple):
     """A value that is marked as a placeholder.
 
@@ -35,6 +39,13 @@ class Mark(NamedTuple):
     table: str
     place: int
     key: str
+
+    @property
+    def stored(self) -> Mark:
+        """The same with the key that `Site.save` writes for it."""
+        if self.table != "events":
+            return self
+        return self._replace(key=STORED_KEYS.get(self.key, self.key))
 
     @property
     def path(self) -> str:
@@ -63,7 +74,7 @@ def placeholders(text: str) -> list[str]:
 
 
 def marks_of(path: str | os.PathLike[str]) -> list[Mark]:
-    """Return the values that are marked as placeholders in a site file; none of a name."""
+    """Return the values that are marked as placeholders in a site file; none if it is no file."""
     file = Path(path)
     if not file.is_file():
         return []
@@ -74,7 +85,8 @@ def save(site: Site, path: Path, marked: Collection[Mark]) -> None:
     """Write a site file in which some values are marked as placeholders."""
     site.save(path)
     if marked:
-        text = with_marks(path.read_text(encoding="utf-8"), marked)
+        stored = {mark.stored for mark in marked}
+        text = with_marks(path.read_text(encoding="utf-8"), stored)
         with atomic(path) as part:
             part.write_text(text, encoding="utf-8")
 

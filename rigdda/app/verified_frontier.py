@@ -50,27 +50,29 @@ def with_frontier(
         Whether the layout of the result was replaced.
     """
     judged = cache(lambda layout: check(layout, "frontier"))
-    fitting = [c.evaluation for c in cases[:-1] if problem.fits(c.evaluation.layout)]
+    missed = cases[-1].evaluation.targets == MISSED
     front: tuple[TriedLayout, ...] = ()
-    if cases[-1].evaluation.targets != MISSED:
-        fitting = [e for e in fitting if judged(e.layout).targets == MET]
-        searched = searched and bool(fitting)
-    elif design_events(problem.site):
+    if missed and design_events(problem.site):
         known = with_verified_frontier(problem, result.tried, cases, judged)
         result, front = replace(result, tried=known), frontier(known)
     if not searched:
         return result, front, False
-    layouts = [evaluation.layout for evaluation in fitting]
+    others = [c.evaluation for c in cases[:-1] if problem.fits(c.evaluation.layout)]
+    if not missed:
+        others = [e for e in others if e.targets != MISSED and judged(e.layout).targets == MET]
+        if not others:
+            return result, front, False
+    layouts = [evaluation.layout for evaluation in others]
     layouts += [one.layout for one in front if one.verified is not None]
     layouts.append(cases[-1].evaluation.layout)
     seen = [judged(layout) for layout in dict.fromkeys(layouts)]
     best = best_of_finals(problem, seen).layout
     if best == result.layout:
         return result, front, False
-    others = {case.evaluation.layout: case.evaluation for case in cases[:-1]}
-    evaluation = others[best] if best in others else check(best, "verification")
+    verified = {case.evaluation.layout: case.evaluation for case in cases[:-1]}
+    evaluation = verified[best] if best in verified else check(best, "verification")
     cases[-1] = VerifiedLayout(cases[-1].name, evaluation)
-    return _with_layout(problem, result, evaluation, list(others)), front, True
+    return _with_layout(problem, result, evaluation, list(verified)), front, True
 
 
 def with_verified_frontier(

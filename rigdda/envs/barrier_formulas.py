@@ -32,6 +32,10 @@ PUSHED = 0.5
 embankments of reinforced soil held impacts that displaced them by more (Peila et al. 2007,
 Landslides 4, 255-265, from memory)."""
 
+STEEPEST = 80.0
+"""Largest angle of friction and inclination together that is counted [deg]. A structure cannot
+slide onto ground that rises steeply in the direction of the thrust."""
+
 SLIDING_SAFETY, OVERTURNING_SAFETY = 1.5, 2.0
 """Factors of safety that are customary under permanent loads [-]. Under the design impact, which
 has its own partial factors and is accidental, 1 is enough."""
@@ -189,7 +193,7 @@ class Base(NamedTuple):
         weight = gravity * barrier.density * section(outline)
         touched = "rock" if "rock" in scene.surfaces else next(iter(scene.surfaces))
         angle = min(scene.friction_deg(own, name) for name in below)
-        angle = max(angle - base_inclination(scene.terrain, outline), 0.0)
+        angle = min(max(angle - base_inclination(scene.terrain, outline), 0.0), STEEPEST)
         return cls(
             weight=weight,
             width=barrier.thickness if isinstance(barrier, GravityWall) else 0.0,

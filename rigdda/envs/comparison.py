@@ -2,9 +2,9 @@
 
 Most releases cost the same with both layouts. The extra cost of the first layout and its savings
 are therefore treated as two separate means of rarely incurred costs, each with its own interval
-(see `rigdda.envs.intervals`). A release cannot have both, so that their covariance over n releases
-is minus the product of their means, and the variance of the mean difference is the sum of the two
-variances plus 2 E[extra] E[saving] / n.
+(see `rigdda.envs.intervals`). A release cannot have both, so that the covariance of the two means
+over n releases is -E[extra] E[saving] / n, and the variance of the mean difference is the sum of
+the two variances plus 2 E[extra] E[saving] / n.
 """
 
 from __future__ import annotations

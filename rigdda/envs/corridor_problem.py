@@ -175,7 +175,7 @@ class CorridorProblem:
         """Return the evaluation of the corridor from those of its sections.
 
         Sections without barriers do not contribute to the gain or to its interval. The errors of
-        sections of the same site on the same releases are added, the others are independent.
+        sections of the same site on the same releases are added; all others are independent.
         """
         lengths = self.lengths.tolist()
         rows = list(zip(lengths, self.problems, evaluations, strict=True))
@@ -198,14 +198,8 @@ class CorridorProblem:
         Sections with the same layout contribute neither to the difference [EUR/year] nor to its
         95 % interval.
         """
-        pairs = zip(one.sections, other.sections, strict=True)
-        rows = [
-            (length, problem, e, f)
-            for length, problem, (e, f) in zip(
-                self.lengths.tolist(), self.problems, pairs, strict=True
-            )
-            if e.layout != f.layout
-        ]
+        columns = (self.lengths.tolist(), self.problems, one.sections, other.sections)
+        rows = [row for row in zip(*columns, strict=True) if row[2].layout != row[3].layout]
         less = _total([(length, problem, e) for length, problem, e, _ in rows])
         more = _total([(length, problem, f) for length, problem, _, f in rows])
         return Mean(more.value - less.value, *difference(more, less))

@@ -101,7 +101,7 @@ class Evaluation:
         Number of releases, and how many of them were simulated for this evaluation; the others came
         from the outcome cache. `simulated` is ignored in comparisons.
     seconds : float
-        Processor time of the simulations [s], NaN in an executor; ignored in comparisons.
+        Processor time of the simulations [s], NaN if an executor ran them; ignored in comparisons.
     risk : Risk or None
         Risk to the traffic; None if the site has no `[traffic]`.
     """
@@ -382,7 +382,7 @@ def judge(
     facts : mapping of str to Facts
         Barrier-free statistics of each event. Those of some events may be left out if there are at
         least two releases per event; intervals of rare harm are then too short, and `debris_share`
-        does not count these events.
+        is 1 if any rock reaches the road.
     shares : mapping of str to float
         Probability of each event.
 
@@ -419,7 +419,10 @@ def judge_account(
     else:
         sums = _weighted(site, layout, found, facts, shares)
     annual = site.annual(layout)
-    without = math.fsum(site.rate(name) * fact.debris for name, fact in facts.items())
+    without = math.fsum(site.rate(name) * facts[name].debris for name in names if name in facts)
+    share = sums.volume.value / without if without else 0.0
+    if not facts.keys() >= set(names):
+        share = 1.0 if sums.volume.value else 0.0
     return Evaluation(
         layout=layout,
         seeds=(),
@@ -433,7 +436,7 @@ def judge_account(
         cost=site.capital(layout),
         debris=sums.volume.value,
         debris_ci=sums.volume.interval,
-        debris_share=sums.volume.value / without if without else 0.0,
+        debris_share=share,
         reach=_probabilities(names, found, found.reached),
         failure=_probabilities(names, found, found.failed),
         by_event=sums.by_event,

@@ -113,8 +113,8 @@ class Targets:
     ) -> float:
         """Return the largest excess over a target [-], 0 if there is none.
 
-        It is that of upper bounds, estimates or lower bounds: of a probability its difference from
-        the target, of the individual risk see `excess`.
+        It is computed from upper bounds, estimates or lower bounds, see `end`. For a probability,
+        it is the difference from the target; for the individual risk, see `excess`.
 
         Parameters
         ----------

@@ -71,7 +71,7 @@ def test_blocks_of_a_deposit_count_as_many_as_are_independent() -> None:
     assert twice == pytest.approx(2 * alone, abs=1)
     group = fit.independent_blocks(SITE, one._replace(event="group", releases=30), range(40))
     assert 0.9 * alone < group < 6 * 30
-    with pytest.raises(BadInput, match="in a column releases"):
+    with pytest.raises(BadInput, match="in the column releases"):
         fit.independent_blocks(SITE, one._replace(releases=1), range(100))
 
 
@@ -257,7 +257,10 @@ def test_values_read_back_belong_to_their_observations(tmp_path: Path) -> None:
     runs = DataSet(OBSERVED_RUN_OUT, "block", np.array(stops, dtype=np.float64))
     sets = {one.name: one, runs.name: runs}
     parameters = [parse(PATHS[0])]
-    quiet = lambda done, words: None  # noqa: E731
+
+    def quiet(done: float, words: str) -> None:
+        """Show no progress."""
+
     fits = [fit.fit(SITE, sets, parameters, 8, 20, 3, quiet, out=out) for out in (None, tmp_path)]
     again = fit.fit(SITE, sets, parameters, 8, 20, 3, quiet, out=tmp_path)
     for other in (fits[1], again):

@@ -364,7 +364,8 @@ def test_an_undecided_layout_is_replaced_by_one_that_meets_the_target() -> None:
     cases = [VerifiedLayout(n, e) for n, e in zip("abc", (known[()], rule, cheap), strict=True)]
     found, front, replaced = verified_frontier.with_frontier(PROBLEM, result, cases, check, True)
     assert (found.layout, front, replaced) == (rule.layout, (), True)
-    assert cases[-1].evaluation == rule and checked == 3 * ["frontier"]
+    assert cases[-1].evaluation == rule
+    assert checked == ["frontier", "frontier"]  # no barrier is shown to miss it
     alone = [VerifiedLayout("a", known[()]), VerifiedLayout("c", cheap)]
     same = verified_frontier.with_frontier(PROBLEM, result, alone, check, True)
     assert same == (result, (), False)

@@ -788,7 +788,15 @@ def test_placeholders_stay_marked_in_files_that_commands_write(tmp_path: Path) -
     again = value_origins.with_marks(bare, found)
     assert value_origins.marks(again) == found
     site = Site.load("quick")
-    kept = [value_origins.Mark("slope", 0, "toe"), value_origins.Mark("events", 1, "rate")]
+    mark = value_origins.Mark
+    kept = [
+        mark("slope", 0, "toe"),
+        mark("events", 1, "return_period"),
+        mark("events", 0, "volume"),
+    ]
     value_origins.save(site, tmp_path / "site.toml", kept)
-    assert set(value_origins.marks_of(tmp_path / "site.toml")) == set(kept)
+    length = mark("traffic", 0, "section_length")
+    assert length.stored == length
+    found = set(value_origins.marks_of(tmp_path / "site.toml"))
+    assert found == {mark("slope", 0, "toe"), mark("events", 1, "rate"), mark("events", 0, "area")}
     assert Site.load(tmp_path / "site.toml") == site

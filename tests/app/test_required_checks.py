@@ -125,7 +125,7 @@ DEAR = (130.0, 120.0, 140.0)
         ({"layout": ""}, "Build nothing: no layout was found that meets every check and is worth "),
         ({"layout": "", "required": False}, "Build nothing: no layout was found that is worth"),
         ({"layout": "", "targets": "met"}, "Build nothing: the slope without barriers meets"),
-        ({"layout": "", "targets": "undecided"}, "Verify with more releases: no layout was found"),
+        ({"layout": "", "targets": "undecided"}, "Verify with more releases: no layout was shown"),
         ({"layout": "", "targets": "missed"}, "No layout that was found meets the target that"),
         ({"targets": "missed"}, "No layout that was found meets the target that rock arrives"),
         ({"targets": "missed", "failed": (ENERGY,)}, "No layout that was found meets the target"),

@@ -103,7 +103,7 @@ def test_events_are_copied_under_names_that_are_free():
         assert site.events[-1].rate == last.rate
         assert len(set(site.event_names)) == len(site.events)
         assert site.events[-1].name.endswith(str(number))
-    fewer = Site.parse(parts.without_event(text, len(site.events) - 1), "site.toml")
+    fewer = Site.parse(parts.without_event(text, site, len(site.events) - 1), "site.toml")
     assert fewer.events == site.events[:-1]
 
 
@@ -111,10 +111,10 @@ def test_factors_of_meshes_follow_their_events() -> None:
     text = Path(rigdda.__file__).parent.joinpath("sites/verge.toml").read_text()
     site = Site.load("verge")
     (mesh,) = [m for m in site.meshes if site.events[0].name in m.factors][:1]
-    renamed = Site.parse(parts.renamed_event(text, 0, "stones"), "site.toml")
+    renamed = Site.parse(parts.renamed_event(text, site, 0, "stones"), "site.toml")
     assert renamed.events[0].name == "stones"
     assert renamed.mesh(mesh.name).factors["stones"] == mesh.factors[site.events[0].name]
-    fewer = Site.parse(parts.without_event(text, 0), "site.toml")
+    fewer = Site.parse(parts.without_event(text, site, 0), "site.toml")
     assert site.events[0].name not in fewer.mesh(mesh.name).factors
 
 
@@ -123,3 +123,5 @@ def test_events_that_a_file_leaves_out_are_written_first() -> None:
     site = Site.load("ritchie-35")
     more = Site.parse(parts.with_event(text, site), "site.toml")
     assert len(more.events) == len(site.events) + 1 and more.events[0] == site.events[0]
+    renamed = Site.parse(parts.renamed_event(text, site, 0, "stones"), "site.toml")
+    assert renamed.events[0].name == "stones"

@@ -59,11 +59,11 @@ def final_score(problem: DesignProblem, evaluation: Evaluation) -> tuple[float, 
 def best_of_finals(problem: DesignProblem, evaluations: Sequence[Evaluation]) -> Evaluation:
     """Return the best of some evaluations with many releases each.
 
-    Layouts that are shown to miss a target rank behind all others. Of the rest, it is the first by
-    `final_score` if the probabilities of any layout are within the targets. If none are,
+    Layouts that are shown to miss a target are left out, unless all are. If the estimates of any
+    remaining layout are within the targets, the best is the first by `final_score`. If none are,
     differences in the excess may be due to chance, and a layout that costs a multiple should not be
-    preferred because of them. Then it is the layout with the lowest Z among those that are not
-    shown to miss the targets by more than the first: the lower bounds of their excesses are not
+    preferred because of them. The best is then the layout with the lowest Z among those that are
+    not shown to miss the targets by more than the first: the lower bounds of their excesses are not
     above the upper bound of the excess of the first.
     """
     evaluations = [e for e in evaluations if e.targets != MISSED] or evaluations

@@ -246,9 +246,10 @@ def allocation(
     standard deviation of its cost over the square root of its computing time. An event has fewer
     releases if its cost has a smaller standard deviation with the leaders than without barriers,
     because it then does not distinguish the candidates. An event with no more than the two releases
-    of every plan has none. The simulation of a large mass takes as long as that of hundreds of
-    blocks, and a few releases of it do not distinguish candidates. If there are targets, each
-    design event has enough releases to decide whether they are met, up to half of all releases.
+    of every plan has none; if this holds for all events, the most important ones have three. The
+    simulation of a large mass takes as long as that of hundreds of blocks, and a few releases of it
+    do not distinguish candidates. If there are targets, each design event has enough releases to
+    decide whether they are met, up to half of all releases.
     """
     shares = {name: float(count) for name, count in problem.allocation(max(n, PLANNED)).items()}
     for name in shares:

@@ -124,7 +124,7 @@ def practice(site: str, budget: int = 500, seed: int = 0, max_barriers: int = 3)
     """Return a task on any site for the development of an entry, as the exam would pose it.
 
     The releases are simulated in this process. Releases without barriers that designers of the
-    package simulate on the site are counted, as in the exam.
+    package simulate on the site are counted, as in the exam, until another task is made.
 
     Parameters
     ----------

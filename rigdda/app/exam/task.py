@@ -299,10 +299,10 @@ SIMULATE = catalogue.ensemble
 
 
 def count_crossings(tasks: Sequence[Task]) -> None:
-    """Let the designers of the package take the releases without barriers of tasks from them.
+    """Count the releases without barriers that the designers of the package simulate for tasks.
 
-    These releases are then counted. Those of other sites, also of earlier tasks, are simulated and
-    not counted.
+    The designers request these releases from the tasks. Releases of other sites, including those
+    of earlier tasks, are simulated without being counted.
     """
     known = {own.problem.key: own for own in tasks}
 

@@ -131,8 +131,10 @@ def shares(falls: Sequence[Fall]) -> dict[str, Estimate]:
         own = np.array([fall.end == end for fall in falls])
         share, count = float(own.mean()) if len(own) else math.nan, len(own)
         off = np.bincount(seeds, own - share) if 0.0 < share < 1.0 else np.zeros(len(sizes))
-        between = float(off @ off)
-        if between > 0.0:
+        between = float(off @ off) * len(sizes) / max(len(sizes) - 1, 1)
+        if len(sizes) == 1:
+            count = 1
+        elif between > 0.0:
             count = max(1, min(count, round(share * (1.0 - share) * len(own) ** 2 / between)))
         one = estimate(round(share * count) if count else 0, count)
         found[end] = replace(one, probability=share, releases=len(own)) if count else one

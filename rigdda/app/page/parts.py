@@ -111,15 +111,16 @@ def _room_for_band(site: Site) -> tuple[float, float]:
 
 def without_source(text: str, site: Site, place: int) -> str:
     """Return the text without a source and without the events from it."""
-    name = site.sources[place].name
+    name, text = site.sources[place].name, _with_events(text, site)
     for k in reversed(range(len(site.events))):
         if site.events[k].source == name:
-            text = without_event(text, k)
+            text = without_event(text, site, k)
     return edits.without(text, ("sources", place))
 
 
 def renamed_source(text: str, site: Site, place: int, name: str) -> str:
     """Return the text with another name of a source, which its events follow."""
+    text = _with_events(text, site)
     values: dict[tuple[str | int, ...], Any] = {("sources", place, "name"): name}
     for k, event in enumerate(site.events):
         if event.source == site.sources[place].name:
@@ -135,8 +136,9 @@ def with_event(text: str, site: Site) -> str:
     return edits.with_table(text, "events", event)
 
 
-def without_event(text: str, place: int) -> str:
+def without_event(text: str, site: Site, place: int) -> str:
     """Return the text without an event, and without the factors of meshes on its rate."""
+    text = _with_events(text, site)
     name = _table(text, "events", place)["name"]
     for k, mesh in enumerate(tomlkit.parse(text).unwrap().get("meshes", [])):
         if name in mesh.get("factors", {}):
@@ -144,8 +146,9 @@ def without_event(text: str, place: int) -> str:
     return edits.without(text, ("events", place))
 
 
-def renamed_event(text: str, place: int, name: str) -> str:
+def renamed_event(text: str, site: Site, place: int, name: str) -> str:
     """Return the text with another name of an event, which the factors of meshes follow."""
+    text = _with_events(text, site)
     before = _table(text, "events", place)["name"]
     for k, mesh in enumerate(tomlkit.parse(text).unwrap().get("meshes", [])):
         if before in mesh.get("factors", {}):

@@ -430,7 +430,7 @@ class SlopeTab:
 
     def _remove_event(self, i: int) -> None:
         words = f"removed {self.project.site.events[i].name}"
-        self._edit(lambda old: parts.without_event(old, i), words)
+        self._edit(lambda old: parts.without_event(old, self.project.site, i), words)
 
     def _sizes(self, i: int, place: int) -> list[Any]:
         """Return the inputs for the volumes of the blocks of an event, and their shapes."""
@@ -474,7 +474,8 @@ class SlopeTab:
         self._change(values, f"set the ground of {name}")
 
     def _rename_event(self, i: int, name: str) -> None:
-        self._edit(lambda old: parts.renamed_event(old, i, name), "set the name of an event")
+        site = self.project.site
+        self._edit(lambda old: parts.renamed_event(old, site, i, name), "set the name of an event")
 
     def _set_aspect(self, place: int, longest: float) -> None:
         least = self.project.site.sources[place].aspect[0]

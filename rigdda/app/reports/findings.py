@@ -95,7 +95,7 @@ def headline(answer: DesignAnswer) -> str:
         )
     if not layout and answer.targets == UNDECIDED:
         return (
-            f"Verify with more releases: no layout was found that meets the target that "
+            f"Verify with more releases: no layout was shown to meet the target that "
             f"{answer.asked}, and these releases do not decide whether the slope {answer.bare} "
             "meets it."
         )
@@ -325,7 +325,7 @@ def frontier(
     tried : int
         Number of layouts among which the frontier was determined.
     replaced : bool
-        Whether the layout of the search was replaced by one of the frontier.
+        Whether the layout of the search was replaced by another verified layout.
     """
     chosen = (
         f"{done.chosen.name!r} was chosen instead of the layout of the search, because it meets "

@@ -162,8 +162,8 @@ def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
     if count < LEAST_VALUES:
         hint = (
             f"a deposit of {one.releases} releases has as little information as {count} blocks, "
-            f"and a fit needs {LEAST_VALUES}: give deposits of more releases, with their number in "
-            "a column releases"
+            f"but a fit needs {LEAST_VALUES}: give a deposit of more releases, and give their "
+            "number in the column releases"
         )
         raise BadInput(f"observed deposit of {one.event}", count, hint)
     return min(count, DEPOSIT_PIECES)

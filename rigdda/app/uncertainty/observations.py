@@ -162,7 +162,7 @@ def _table(path: Path, only: str) -> tuple[list[str], list[list[str]]]:
     if sum(forms) != 1 or not ("event" in names or only):
         hint = f"name its columns event and {FORMS} in the first row"
         if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
-            hint = "separate its columns by commas, with a decimal point in numbers"
+            hint = "separate its columns with commas and write numbers with a decimal point"
         raise BadInput(f"observed {path}", ", ".join(names), hint)
     check.distinct(f"observed {path}", names)
     return names, rows

@@ -41,6 +41,7 @@ from rigdda.barriers import (
 from rigdda.barriers.base import (
     Reach,
     base_inclination,
+    sliding_angle,
     sliding_resistance,
     surfaces_below,
 )
@@ -192,7 +193,7 @@ class SingleReleases:
         if not isinstance(barrier, Embankment):
             return barrier.resistance(self._scene, NEVER)
         friction = min(float(self._properties.friction_deg[pair]) for pair in standing.base)
-        angle = friction - standing.inclination
+        angle = sliding_angle(friction, standing.inclination)
         return sliding_resistance(self._gravity, barrier.density, standing.area, angle)
 
     def _ending(

@@ -403,12 +403,12 @@ def base_friction(scene: Subsoil, density: float, own: str, outline: Floats) -> 
     """Return the horizontal thrust at which a body slides downhill on the ground [N/m].
 
     The friction is the least between its surface `own` and the surfaces under it, see
-    `sliding_resistance`.
+    `sliding_angle`.
     """
     assert scene.terrain is not None
     below = surfaces_below(scene.terrain, outline)
     angle = min(scene.interface(own, name).friction_deg for name in below)
-    angle -= base_inclination(scene.terrain, outline)
+    angle = sliding_angle(angle, base_inclination(scene.terrain, outline))
     return sliding_resistance(-scene.gravity_vector[1], density, section(outline), angle)
 
 
@@ -433,20 +433,27 @@ def surfaces_below(terrain: Terrain, outline: Floats) -> list[str]:
     ]
 
 
+def sliding_angle(friction_deg: float, inclination_deg: float) -> float:
+    """Return the angle phi - b of the resistance W tan(phi - b) to sliding on a slope [deg].
+
+    The resistance is the horizontal thrust at which a body of weight W slides, from the equilibrium
+    on ground that falls at an angle b in the direction of the thrust, with the friction angle phi.
+    The angle is 0 if b is greater than phi. Ground that rises in this direction counts as level.
+    """
+    return max(friction_deg - max(inclination_deg, 0.0), 0.0)
+
+
 def sliding_resistance(gravity: float, density: float, area: float, angle_deg: float) -> float:
     """Return the horizontal thrust at which a body slides on the ground [N/m].
-
-    From the equilibrium on ground that falls at an angle b in the direction of the thrust, it is W
-    tan(phi - b) with the weight W and the friction angle phi, and 0 if b is greater.
 
     Parameters
     ----------
     gravity, density, area : float
         Gravity [m/s2], density [kg/m3] and area of the section [m2].
     angle_deg : float
-        Friction angle less the inclination of the ground, phi - b [deg].
+        Friction angle less the inclination of the ground, see `sliding_angle` [deg].
     """
-    return gravity * density * area * math.tan(math.radians(max(angle_deg, 0.0)))
+    return gravity * density * area * math.tan(math.radians(angle_deg))
 
 
 FOUNDATION = 1.0

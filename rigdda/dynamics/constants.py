@@ -25,11 +25,6 @@ ROUNDING = 1e-12
 RECOVERY_SWEEPS = 6
 """Number of sweeps over the contacts of an island in position correction."""
 
-RETARDATION_TIME = 5e-3
-"""Retardation time of contacts at rest: viscosity over stiffness [s]. Longer steps damp more,
-because the contact force depends on the velocity at the end of the step. Arches at 0.9 to 1.1 of
-their limit load behave as they should in steps of 0.1 ms without it, too."""
-
 SETTLED = 0.02
 """Relative change per iteration at which an iteration may stop [-]. In open-close iteration this is
 the change of a friction force over its limit; in relaxation, the change of a normal velocity over
@@ -60,12 +55,6 @@ SAME_FACE = 0.999
 """Cosine of the angle above which two edges, or the faces of two contacts of a vertex, count as
 collinear [-]."""
 
-LATELY = 0.7
-"""Factor by which the recent peak speed of a body decays per step; the decayed peak bounds its path
-in the next step [-]. In a pile, blocks stop and are pushed on from step to step, so that a block
-that is momentarily at rest may still move. The thrust of rows and piles on embankments is the same
-without this bound."""
-
 MARGIN_RATIO = 5e-3
 """Distance over block size within which even bodies at rest are contact candidates [-]."""
 
@@ -79,9 +68,6 @@ SLEEP_TIME = 0.5
 GROWN = 0.1
 """Increase in speed, over `SLEEP_SPEED`, above which a block is not quiet [-]. Without it, blocks
 on a slope 0.2 deg too steep for them fell asleep before they slid."""
-
-LONGEST_FLIGHT = 64
-"""Maximum number of steps of a free flight. Longer flights require a wider search for obstacles."""
 
 SPEED_LIMIT = 1e4
 """Speed above which a simulation is stopped as diverged [m/s], thirty times the speed of any

@@ -13,7 +13,7 @@ import math
 from numpy.typing import NDArray
 
 from rigdda.dynamics.arrays import GroundArrays, Islands, Monitors, Outlines
-from rigdda.dynamics.constants import ASLEEP, AWAKE, LONGEST_FLIGHT, RETIRED
+from rigdda.dynamics.constants import ASLEEP, AWAKE, RETIRED
 from rigdda.dynamics.island_step import check_body, fall
 from rigdda.dynamics.monitors import barrier_contact
 from rigdda.dynamics.motion import top_speed
@@ -51,24 +51,26 @@ def time_to_fall(gap: float, speed: float, gravity: float) -> float:
 
 @kernel
 def time_to_ground(
-    body: Body, i: int, outlines: Outlines, ground: GroundArrays, speed: float, reach: float,
-    most: float, gravity: float,
+    body: Body, i: int, outlines: Outlines, ground: GroundArrays, reach: float, most: float,
+    p: Parameters,
 ) -> float:  # fmt: skip
-    """Return a lower bound on the time until the body is within `reach` of the ground [s].
+    """Return a lower bound on the time until the body may touch the ground [s], at most `most`.
 
-    The bound is at most `most`. For each segment it is the largest of three bounds: from the
-    corners above the line of the segment, from the circumscribed circle above that line, and from
-    the distance of the circle to the segment.
+    For each segment it is the largest of three bounds: from the corners above the line of the
+    segment, from the circumscribed circle above that line, and from the distance of the circle to
+    the segment. For `reach`, see `steps_of_flight`.
     """
-    x, y, r = body.x, body.y, body.radius
+    x, y, r, gravity = body.x, body.y, body.radius, p.gravity
+    later = 2.0 * gravity * p.dt
+    speed = top_speed(body) + later
     for s in range(len(ground.segment) - 1):
-        one, around = ground.segment[s], r + reach + speed * most
+        one, around = ground.segment[s], r + reach + (speed + 0.5 * gravity * most) * most
         if one.left > x + around or one.right < x - around:
             continue
         if one.bottom > y + around or one.top < y - around:
             continue
         nx, ny = one.normal_x, one.normal_y
-        closing = max(-(nx * body.vx + ny * body.vy), 0.0)
+        closing = max(-(nx * body.vx + ny * body.vy), 0.0) + later
         over = nx * (x - one.x) + ny * (y - one.y)
         time = time_to_fall(over - r - reach, closing, gravity)
         if time < most:
@@ -81,20 +83,21 @@ def time_to_ground(
         if time < most:
             along = min(max(ny * (x - one.x) - nx * (y - one.y), 0.0), one.length)
             away = math.hypot(x - one.x - along * ny, y - one.y + along * nx)
-            time = max(time, (away - r - reach) / speed)
+            time = max(time, time_to_fall(away - r - reach, speed, gravity))
         most = min(most, time)
     return most
 
 
 @kernel
 def time_to_bodies(
-    bodies: Bodies, i: int, polygon: Polygons, speed: float, reach: float, most: float
+    bodies: Bodies, i: int, polygon: Polygons, reach: float, most: float, p: Parameters
 ) -> float:
-    """Return a lower bound on the time until body i is within `reach` of another body [s].
+    """Return a lower bound on the time until body i may touch another body [s], at most `most`.
 
-    The bound is at most `most`.
+    For `reach`, see `steps_of_flight`.
     """
     x, y = bodies[i].x, bodies[i].y
+    speed = top_speed(bodies[i]) + 2.0 * p.gravity * p.dt
     for j in range(len(bodies)):
         if j == i or bodies[j].status == RETIRED:
             continue
@@ -102,36 +105,38 @@ def time_to_bodies(
         dx = max(box.low_x - x, x - box.high_x, 0.0)
         dy = max(box.low_y - y, y - box.high_y, 0.0)
         away = math.sqrt(dx * dx + dy * dy) - bodies[i].radius - reach
-        most = min(most, away / speed)
+        most = min(most, time_to_fall(away, speed, p.gravity))
     return most
 
 
 @kernel
 def steps_of_flight(
-    bodies: Bodies, i: int, outlines: Outlines, ground: GroundArrays, p: Parameters
+    bodies: Bodies, i: int, outlines: Outlines, ground: GroundArrays, p: Parameters, steps: int
 ) -> int:
-    """Return the number of steps for which body i cannot touch anything.
+    """Return the number of steps, at most `steps`, for which body i cannot touch anything.
 
     Detection searches within the distance that a corner can travel in a step; twice that distance
-    is used here.
+    is used here. After a time t, it is 2 (v + g t) dt for a speed v at the start: a distance
+    `reach` at the start, which grows by 2 g dt per time as if bodies approached faster by that.
     """
-    body, most = bodies[i], LONGEST_FLIGHT * p.dt
-    speed = max(top_speed(body) + p.gravity * most, body.lately)
-    reach = 2.0 * (speed * p.dt + p.gravity * p.dt * p.dt + p.margin)
-    time = time_to_bodies(bodies, i, outlines.polygon, speed, reach, most)
-    if time > p.dt:
-        time = time_to_ground(body, i, outlines, ground, speed, reach, time, p.gravity)
+    reach = 2.0 * (top_speed(bodies[i]) * p.dt + p.gravity * p.dt * p.dt + p.margin)
+    time = time_to_bodies(bodies, i, outlines.polygon, reach, steps * p.dt, p)
+    if time >= p.dt:
+        time = time_to_ground(bodies[i], i, outlines, ground, reach, time, p)
     return int(max(time, 0.0) / p.dt)
 
 
 @kernel
 def take_off(
     bodies: Bodies, outlines: Outlines, ground: GroundArrays, islands: Islands, begin: Ints,
-    p: Parameters,
+    p: Parameters, steps: int,
 ) -> tuple[int, int]:  # fmt: skip
-    """Return the flying body and its number of steps, 0 if none flies; set it up as island 0."""
+    """Return the flying body and its number of steps, at most `steps`; set it up as island 0.
+
+    The number is 0 if no body flies.
+    """
     i = lone_flyer(bodies, begin, p)
-    steps = steps_of_flight(bodies, i, outlines, ground, p) if i >= 0 else 0
+    steps = steps_of_flight(bodies, i, outlines, ground, p, steps) if i >= 0 else 0
     if steps > 0:
         islands.block_start[0], islands.block_start[1], islands.block_item[0] = 0, 1, i
         islands.contact_start[0] = islands.contact_start[1] = 0

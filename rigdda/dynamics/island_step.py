@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from rigdda.dynamics.arrays import Islands, Monitors, Outlines, Rows, Totals, Work, World
 from rigdda.dynamics.constants import (
     BOLT,
-    LATELY,
     OPEN,
     PIN,
     PLAIN,
@@ -79,7 +78,6 @@ def fall(body: Body, p: Parameters, ledger: NDArray) -> None:
     ledger[2] -= alpha * slow / dt
     ledger[3] += (fx - body.mass * p.gravity_x) * dx + (fy - body.mass * p.gravity_y) * dy
     ledger[3] += moment * turn
-    body.lately = LATELY * max(top_speed(body), body.lately)
     body.vx, body.vy = 2.0 * dx / dt - body.vx, 2.0 * dy / dt - body.vy
     body.omega = 2.0 * turn / dt - body.omega
     body.x += dx
@@ -94,7 +92,6 @@ def stop_fence(body: Body, p: Parameters, ledger: NDArray) -> None:
     time = min(p.dt, max(body.vx, 0.0) / deceleration)
     speed = body.vx - deceleration * time
     ledger[4] -= 0.5 * body.mass * (body.vx * body.vx - speed * speed)
-    body.lately = LATELY * max(top_speed(body), body.lately)
     body.x += 0.5 * (body.vx + speed) * time
     body.vx = speed
 
@@ -106,7 +103,6 @@ def take_slot(body: Body, slot: Floats, scale: Floats, p: Parameters, ledger: ND
     Contacts that act at one instant of the step, and position correction, also move bodies against
     weight and loads. This work counts as impact.
     """
-    body.lately = LATELY * max(top_speed(body), body.lately)
     if body.brake > 0.0:
         body.vx, body.x = slot[NOW] * slot[MOVES], slot[X]
         return
@@ -254,10 +250,8 @@ def accumulate_force(c: Contact) -> None:
     if c.state == OPEN:
         c.accumulated_normal = c.accumulated_shear = c.accumulated_roll = 0.0
     else:
-        elastic = c.stiffness / c.kappa if c.kind == REST else 1.0
-        c.accumulated_normal += elastic * (c.normal - c.accumulated_normal)
-        c.accumulated_shear += elastic * (c.shear - c.accumulated_shear)
-        c.accumulated_roll += elastic * (c.roll - c.accumulated_roll)
+        c.accumulated_normal, c.accumulated_shear = c.normal, c.shear
+        c.accumulated_roll = c.roll
 
 
 @inlined

@@ -160,7 +160,7 @@ def advance(
         time = (counters[STEPS] + 1) * p.dt
         if may_fly and flown == flight:
             land(bodies, outlines, flyer, flown)
-            flyer, flight = take_off(bodies, outlines, ground, work.islands, work.begin, p)
+            flyer, flight = take_off(bodies, outlines, ground, work.islands, work.begin, p, steps)
             flown = 0
         if flown < flight:
             flown += 1

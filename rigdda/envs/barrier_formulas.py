@@ -32,10 +32,6 @@ PUSHED = 0.5
 embankments of reinforced soil held impacts that displaced them by more (Peila et al. 2007,
 Landslides 4, 255-265, from memory)."""
 
-STEEPEST = 80.0
-"""Largest angle of friction and inclination together that is counted [deg]. A structure cannot
-slide onto ground that rises steeply in the direction of the thrust."""
-
 SLIDING_SAFETY, OVERTURNING_SAFETY = 1.5, 2.0
 """Factors of safety that are customary under permanent loads [-]. Under the design impact, which
 has its own partial factors and is accidental, 1 is enough."""
@@ -164,8 +160,8 @@ class Base(NamedTuple):
     width : float
         Width of its base [m]; 0 for an embankment, which slides but does not overturn.
     friction : float
-        Horizontal resistance to sliding over the weight [-]: tan(phi - b) with the friction angle
-        phi and the inclination b of the ground.
+        Horizontal resistance to sliding over the weight [-]: tan(phi - b), see
+        `rigdda.barriers.base.sliding_angle`.
     bearing : float
         Admissible pressure on the ground [Pa].
     restitution : float
@@ -193,7 +189,7 @@ class Base(NamedTuple):
         weight = gravity * barrier.density * section(outline)
         touched = "rock" if "rock" in scene.surfaces else next(iter(scene.surfaces))
         angle = min(scene.friction_deg(own, name) for name in below)
-        angle = min(max(angle - base_inclination(scene.terrain, outline), 0.0), STEEPEST)
+        angle = sliding_angle(angle, base_inclination(scene.terrain, outline))
         return cls(
             weight=weight,
             width=barrier.thickness if isinstance(barrier, GravityWall) else 0.0,

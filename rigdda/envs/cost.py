@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import html
 import math
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -88,7 +89,7 @@ class Evaluation:
         year].
     debris_share : float
         `debris` divided by its value without barriers [-]; 0 if no rock reaches the road without
-        barriers.
+        barriers, NaN if that is not known.
     reach, failure : dict of str to Estimate
         For each event the probability that a block reaches the road, and that a barrier fails.
     by_event : dict of str to float
@@ -214,7 +215,7 @@ class Facts:
     toll : tuple of Known
         Vehicles hit, vehicles that run into debris and fatalities given that any are, computed as
         harm is; empty if the site has no `[traffic]`.
-    tolled : tuple of int
+    toll_counts : tuple of int
         Number of releases with each of them.
     """
 
@@ -225,7 +226,7 @@ class Facts:
     blocks: float
     width: float
     toll: tuple[Known, ...] = ()
-    tolled: tuple[int, ...] = ()
+    toll_counts: tuple[int, ...] = ()
 
     @property
     def debris(self) -> float:
@@ -323,7 +324,7 @@ def learn(site: Site, own: Account, released: Floats, widths: Floats, blocks: fl
     """
     harm, volume = own.harm[own.reached], own.volume[own.reached]
     toll = None if own.toll is None else own.toll[own.reached]
-    tolled = () if toll is None else tuple((toll > 0.0).sum(axis=0).tolist())
+    toll_counts = () if toll is None else tuple((toll > 0.0).sum(axis=0).tolist())
     if not len(harm):
         volume = released
         harm = np.array([site.consequences.harm(v, True) for v in volume.tolist()])
@@ -336,7 +337,7 @@ def learn(site: Site, own: Account, released: Floats, widths: Floats, blocks: fl
     tolls = () if toll is None else tuple(map(_known_of, toll.T))
     count = len(own.harm), int(own.reached.sum())
     width = float(widths.mean())
-    return Facts(*count, Known.of(harm), Known.of(volume), blocks, width, tolls, tolled)
+    return Facts(*count, Known.of(harm), Known.of(volume), blocks, width, tolls, toll_counts)
 
 
 def _known_of(values: Floats) -> Known:
@@ -382,7 +383,7 @@ def judge(
     facts : mapping of str to Facts
         Barrier-free statistics of each event. Those of some events may be left out if there are at
         least two releases per event; intervals of rare harm are then too short, and `debris_share`
-        is 1 if any rock reaches the road.
+        is NaN.
     shares : mapping of str to float
         Probability of each event.
 
@@ -419,10 +420,9 @@ def judge_account(
     else:
         sums = _weighted(site, layout, found, facts, shares)
     annual = site.annual(layout)
-    without = math.fsum(site.rate(name) * facts[name].debris for name in names if name in facts)
+    known = [facts[name].debris if name in facts else math.nan for name in names]
+    without = math.fsum(map(operator.mul, map(site.rate, names), known))
     share = sums.volume.value / without if without else 0.0
-    if not facts.keys() >= set(names):
-        share = 1.0 if sums.volume.value else 0.0
     return Evaluation(
         layout=layout,
         seeds=(),
@@ -516,7 +516,7 @@ def _weighted(
     tolls = []
     for j, mean in enumerate(toll_means(drawn, mixed)):
         unseen_toll = math.fsum(
-            (1.0 - seen[n]) * rate[n] * fact.toll[j].mean * fact.tolled[j] / fact.releases
+            (1.0 - seen[n]) * rate[n] * fact.toll[j].mean * fact.toll_counts[j] / fact.releases
             for n, fact in facts.items()
         )
         tolls.append(mean.moved(unseen_toll))

@@ -690,7 +690,7 @@ class DesignProblem:
             fact = facts[name]
             known, killed = fact.toll[2], list(fatalities.get(name, ()))
             if not killed:
-                count = fact.tolled[2]
+                count = fact.toll_counts[2]
                 killed = [known.mean] * count + [0.0] * (fact.releases - count)
             own = np.array(killed, dtype=np.float64)
             mean = intervals.mean_cost(own, own > 0.0, known)

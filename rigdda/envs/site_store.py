@@ -26,7 +26,7 @@ SHIPPED = Path(__file__).parent / "site_store.msgpack.xz"
 """File that ships with the package, made by `python -m experiments.known_sites`."""
 
 
-FORMAT = 2
+FORMAT = 3
 """Version of the form of stored values. Change it if a field of a stored class changes."""
 
 

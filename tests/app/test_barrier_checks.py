@@ -113,7 +113,7 @@ def test_checks_use_the_mean_strength_of_the_ground(name: str) -> None:
     scene = mean_scene(site, (wall,))
     assert scene.terrain is not None
     angle = math.degrees(math.atan(base.friction))
-    angle += base_inclination(scene.terrain, scene.outline(0))
+    angle += max(base_inclination(scene.terrain, scene.outline(0)), 0.0)
     assert min(abs(angle - one) for one in angles) < 1e-9
     assert base.restitution in {s.restitution for s in site.surfaces.values()}
     assert any(surface.friction_sd_deg > 0.0 for surface in site.surfaces.values())

@@ -229,7 +229,7 @@ STORED = (
 )  # fmt: skip
 """Classes of stored values."""
 
-FORMS = {2: "cb1dbdd5f220a843"}
+FORMS = {3: "9fdfb4b0a3f0d913"}
 """Hash of the fields of these classes by the version of the form."""
 
 

@@ -159,7 +159,7 @@ def test_rolling_resistance_does_not_keep_a_wall_upright(rolling):
 
 @pytest.mark.parametrize("slope_deg", [-10.0, 0.0, 15.0, 25.0, 40.0])
 def test_the_resistance_on_a_slope_is_that_of_statics(slope_deg):
-    """H = W tan(phi - b), and none on a slope that is steeper than the friction."""
+    """H = W tan(phi - b), none if b exceeds phi, and that on level ground where the ground rises."""
     fall = math.tan(math.radians(slope_deg))
     ground = Terrain([(-60.0, 60.0 * fall), (60.0, -60.0 * fall)])
     surfaces = {"rock": Surface(33.0), "soil": Surface(33.0)}
@@ -169,5 +169,5 @@ def test_the_resistance_on_a_slope_is_that_of_statics(slope_deg):
     for barrier in barriers:
         scene = Scene(ground, (box(-20.0, 60.0),), surfaces, barriers=(barrier,))
         weight = barrier.density * GRAVITY * abs(polygon_properties(scene.outline(0))[0])
-        right = weight * math.tan(math.radians(max(33.0 - slope_deg, 0.0)))
+        right = weight * math.tan(math.radians(max(33.0 - max(slope_deg, 0.0), 0.0)))
         assert scene.resistance(0) == pytest.approx(right, rel=1e-6, abs=1e-6)

@@ -95,4 +95,5 @@ def test_a_mass_in_static_mode_settles():
     sim = Simulation(scene, Settings(dt=1e-2, mode="static"))
     start = sim.poses
     sim.step(200)
-    assert np.hypot(*(sim.poses - start)[:, :2].T).max() < 2.0  # about the size of a block
+    moved = np.hypot(*(sim.poses - start)[:, :2].T)
+    assert np.median(moved) < 0.5 and moved.max() < 3.0  # about the size of a block

@@ -101,8 +101,9 @@ class Forecast:
         self._base = self._whole if self._free else self.effects.base
         names = site.event_names
         self._in_event = np.equal.outer(np.arange(len(names)), ensemble.event).astype(np.float64)
-        self._risk = np.maximum(self._in_event @ self._base, 1e-12)  # sum over releases, (E,)
-        count = np.maximum(self._in_event.sum(axis=1), 1.0)
+        risk = self._in_event @ self._base  # sum over releases, (E,)
+        self._unseen, self._risk = risk <= 0.0, np.maximum(risk, 1e-12)
+        self._count = count = np.maximum(self._in_event.sum(axis=1), 1.0)
         self._event_numbers = np.column_stack(
             [
                 np.log10([largest(site, name) for name in names]),
@@ -191,13 +192,18 @@ class Forecast:
         return np.array(rows)
 
     def _share(self, stopped: Bools, factor: Floats) -> Floats:
-        """Return the remaining share of the risk of each event if some blocks are stopped, (E,)."""
+        """Return the remaining share of the risk of each event if some blocks are stopped, (E,).
+
+        If no release of an event reaches the road without barriers, nothing is known of the effect
+        of a barrier on it, and only `factor` counts.
+        """
         volume = self._volume[stopped]
         taken = np.bincount(self._release[stopped], volume, minlength=len(self._whole))
         remains: Floats = np.asarray(self._whole - taken, dtype=np.float64)
         left: Floats = np.where(remains <= 1e-9 * self._whole, 0.0, remains)
         harm = left if self._free else self.effects.harm(left)
-        return np.minimum(self._in_event @ (harm * factor) / self._risk, 1.0)
+        share = np.minimum(self._in_event @ (harm * factor) / self._risk, 1.0)
+        return np.where(self._unseen, self._in_event @ factor / self._count, share)
 
     def analytic(self, layout: Layout) -> tuple[Floats, Floats, Floats]:
         """Return the remaining shares for stopped, low and passing blocks, each (E,)."""

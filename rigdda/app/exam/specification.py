@@ -58,8 +58,13 @@ class Specification(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def key(self) -> str:
-        """Hash of all values of the specification."""
-        return hashlib.sha256(msgspec.json.encode(self)).hexdigest()[:16]
+        """Hash of all values that determine a result.
+
+        The effort of the search for the references is left out, so that better references do not
+        change the releases of the verification.
+        """
+        own = {k: v for k, v in msgspec.structs.asdict(self).items() if k != "reference_releases"}
+        return hashlib.sha256(msgspec.json.encode(own)).hexdigest()[:16]
 
     def problem(self, site: str) -> DesignProblem:
         """Return the design problem of a site."""

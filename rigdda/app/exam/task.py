@@ -63,7 +63,7 @@ class Task:
     Attributes
     ----------
     rng : numpy.random.Generator
-        Generator of random numbers, which depends on the seed.
+        Generator of random numbers, which depends on the seed and the task.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class Task:
         section: int = 0,
     ):
         self.problem, self.name, self.budget, self.seed = problem, name, budget, seed
-        self.rng = np.random.default_rng([seed, section, budget])
+        self.rng = np.random.default_rng([seed, section, budget, *name.encode()])
         self._line, self._section = line, section
         self._begun = line.used
 
@@ -254,7 +254,7 @@ class CorridorTask:
     budget, seed : int
         Releases for all sections together, and seed of the task.
     rng : numpy.random.Generator
-        Generator of random numbers, which depends on the seed.
+        Generator of random numbers, which depends on the seed and the task.
     """
 
     def __init__(self, order: TaskOrder, line: Line):
@@ -262,7 +262,7 @@ class CorridorTask:
         self.lengths = np.array(order.lengths)
         self.money = float(order.money or 0.0)
         self.budget = order.budget * len(order.sites)
-        self.rng = np.random.default_rng([order.seed, order.budget])
+        self.rng = np.random.default_rng([order.seed, order.budget, *order.name.encode()])
         self._line = line
         problems = [DesignProblem(site, order.max_barriers) for site in order.sites]
         self.sections = tuple(

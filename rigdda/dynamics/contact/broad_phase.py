@@ -19,7 +19,7 @@ def sweep_boxes(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) 
     for i in range(len(bodies)):
         body, outline, grow = bodies[i], polygon[i], p.margin
         if body.status == AWAKE:
-            body.path = max(top_speed(body), body.lately) * p.dt
+            body.path = top_speed(body) * p.dt
             grow += body.path + p.gravity * p.dt * p.dt
         box = boxes.swept[i]
         box.low_x, box.high_x = outline.low_x - grow, outline.high_x + grow

@@ -10,11 +10,8 @@ w_0 into -w_0, which makes resting contacts chatter. A spring on the end velocit
 at any stiffness. The kinds of contact differ in the bias b:
 
 =======  ====================================================================================
-at rest  b = N_0 / kappa, with N_0 the force of the last step. kappa = k_n; in steps shorter
-         than the retardation time tau, kappa = k_n tau / dt (a Kelvin-Voigt solid): the force
-         of the part k_n is elastic and carried over to the next step, and that of the rest is
-         viscous. An open gap has b = -g: a contact that would close within the step is slowed
-         to close one step later.
+at rest  b = N_0 / kappa, with N_0 the force of the last step and kappa = k_n. An open gap has
+         b = -g: a contact that would close within the step is slowed to close one step later.
 new      As at rest with N_0 = 0, but stiff in its first step: it finds the force that stops the
          bodies, and continues with it as if they had always been in contact.
 plain    b = -2 g with w_0 taken as 0: a penalty spring on the gap, the paper's contact.
@@ -43,7 +40,6 @@ from rigdda.dynamics.constants import (
     PLAIN,
     PLAIN_CONTACT,
     REST,
-    RETARDATION_TIME,
     RIGID,
     STICK,
 )
@@ -145,7 +141,7 @@ def rest_stiffness(weight: float, c: Contact, p: Parameters) -> float:
 def set_rest(c: Contact, p: Parameters) -> None:
     """Set up a contact at rest, a spring that continues with the force of the last step."""
     c.kind = REST
-    c.kappa = c.stiffness * max(1.0, RETARDATION_TIME / p.dt)
+    c.kappa = c.stiffness
     if c.gap > p.penetration and c.bond == 0.0:
         c.accumulated_normal = 0.0
         c.bias = -c.gap

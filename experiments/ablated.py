@@ -36,6 +36,7 @@ VARIANTS = (
     "SUBSTEPS=3",
     "MOST_SWEEPS=10",
     "SET_OF_SWEEPS=1000",
+    "PROGRESS=0",
     "SAME_NORMAL=-2",
     "SAME_FACE=0.9",
     "PENETRATION_RATIO=1e-3",
@@ -54,7 +55,7 @@ KEPT = "silo-10ms"
 """Expensive case that is computed all the same, because some constants fail only there."""
 
 TESTS = ("test_fences", "test_thrust", "test_foreseen", "test_gravity_walls", "test_lone_block",
-         "test_sleeping", "test_loads_and_supports")  # fmt: skip
+         "test_sleeping", "test_loads_and_supports", "test_locked_wedges")  # fmt: skip
 """Additional tests from tests/physics."""
 
 HARD_STEP = 1e-2

@@ -9,6 +9,7 @@ import numpy as np
 from rigdda.dynamics.arrays import Rows
 from rigdda.dynamics.constants import (
     MOST_SWEEPS,
+    PROGRESS,
     ROUNDING,
     SET_OF_SWEEPS,
     SUBSTEPS,
@@ -287,8 +288,7 @@ def extrapolate(rows: Rows, active: int, most: float) -> float:
     In Anderson's method of depth one (Anderson 1965), the next x is G - theta dG, where d is the
     change since the last extrapolation and theta = r dr / dr^2. It removes the error that decreases
     most slowly, as that of a heavy body that rests or falls on a light one. An extrapolation that
-    does not halve the square of the residual is taken back, and there is no other. In a wedge that
-    locks by friction, residuals stay the same while impulses grow without bounds.
+    does not decrease the square of the residual by `PROGRESS` is taken back, and there is no other.
 
     Parameters
     ----------
@@ -327,7 +327,7 @@ def extrapolate(rows: Rows, active: int, most: float) -> float:
             fact[REACHED + q] = row[IMPULSE + q] = goal + more
     if failed:
         return -1.0
-    return 0.5 * square if share > 0.0 else math.inf
+    return (1.0 - PROGRESS) * square if share > 0.0 else math.inf
 
 
 @kernel

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Scene, Site, limit_equilibrium
 from rigdda.barriers import section
-from rigdda.barriers.base import ELEMENT, base_inclination, surfaces_below
+from rigdda.barriers.base import ELEMENT, base_inclination, sliding_angle, surfaces_below
 from rigdda.barriers.gravity_wall import SLID
 from rigdda.envs.fence_checks import USE_ROUNDING, Action, Demand, FenceCheck
 from rigdda.envs.ritchie_ditch import RitchieDitch

@@ -159,7 +159,7 @@ def test_rolling_resistance_does_not_keep_a_wall_upright(rolling):
 
 @pytest.mark.parametrize("slope_deg", [-10.0, 0.0, 15.0, 25.0, 40.0])
 def test_the_resistance_on_a_slope_is_that_of_statics(slope_deg):
-    """H = W tan(phi - b), none if b exceeds phi, and that on level ground where the ground rises."""
+    """H = W tan(phi - b), none if b exceeds phi; a rise of the ground is not counted."""
     fall = math.tan(math.radians(slope_deg))
     ground = Terrain([(-60.0, 60.0 * fall), (60.0, -60.0 * fall)])
     surfaces = {"rock": Surface(33.0), "soil": Surface(33.0)}

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rigdda import Error, Layout, Site, Trajectories, trajectory_parts
 from rigdda.envs.intervals import Estimate, estimate
+from rigdda.envs.quantiles import BlockSample
 from rigdda.trajectory import Place, PointKind
 
 Floats = NDArray[np.float64]
@@ -126,16 +127,17 @@ def shares(falls: Sequence[Fall]) -> dict[str, Estimate]:
     """
     found = {}
     seeds = np.unique([fall.seed for fall in falls], return_inverse=True)[1]
-    sizes = np.bincount(seeds).astype(np.float64)
+    releases = int(seeds.max(initial=-1)) + 1
+    event = np.zeros(releases, dtype=np.int64)
     for end in ENDS.values():
-        own = np.array([fall.end == end for fall in falls])
+        own = np.array([fall.end == end for fall in falls], dtype=np.float64)
         share, count = float(own.mean()) if len(own) else math.nan, len(own)
-        off = np.bincount(seeds, own - share) if 0.0 < share < 1.0 else np.zeros(len(sizes))
-        between = float(off @ off) * len(sizes) / max(len(sizes) - 1, 1)
-        if len(sizes) == 1:
+        sample = BlockSample(own, seeds, event, np.ones(1))
+        variance = sample.variance(own - share) if count else 0.0
+        if releases == 1:
             count = 1
-        elif between > 0.0:
-            count = max(1, min(count, round(share * (1.0 - share) * len(own) ** 2 / between)))
+        elif variance > 0.0:
+            count = max(1, min(count, round(share * (1.0 - share) / variance)))
         one = estimate(round(share * count) if count else 0, count)
         found[end] = replace(one, probability=share, releases=len(own)) if count else one
     return found

@@ -40,7 +40,6 @@ from rigdda.barriers import (
 )
 from rigdda.barriers.base import (
     Reach,
-    base_inclination,
     sliding_angle,
     sliding_resistance,
     surfaces_below,
@@ -86,7 +85,7 @@ class StandingBarrier(NamedTuple):
     area: float
     """Area of its outline [m2]."""
     inclination: float
-    """Inclination of the ground under it, see `base_inclination` [deg]."""
+    """Inclination of the ground under an embankment, else 0 [deg]."""
     base: list[tuple[int, int]]
     """Pairs of surfaces on which an embankment may slide."""
     road_area: float
@@ -137,7 +136,7 @@ class SingleReleases:
         outline, base, inclination = scene.outline(index), [], 0.0
         if isinstance(barrier, Embankment):
             assert scene.terrain is not None
-            inclination = base_inclination(scene.terrain, outline)
+            inclination = barrier.base_inclination(scene.terrain, outline)
             own = names.index(scene.fill)
             base = [(own, names.index(n)) for n in surfaces_below(scene.terrain, outline)]
         return StandingBarrier(

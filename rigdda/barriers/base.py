@@ -399,27 +399,19 @@ def section(outline: Floats) -> float:
     return abs(polygon_properties(outline)[0])
 
 
-def base_friction(scene: Subsoil, density: float, own: str, outline: Floats) -> float:
-    """Return the horizontal thrust at which a body slides downhill on the ground [N/m].
+def base_friction(
+    scene: Subsoil, density: float, own: str, outline: Floats, inclination_deg: float
+) -> float:
+    """Return the thrust in the direction of x that makes a body slide on the ground [N/m].
 
-    The friction is the least between its surface `own` and the surfaces under it, see
-    `sliding_angle`.
+    The friction is the least between its surface `own` and the surfaces under it. The inclination
+    of the base is positive where it falls in the direction of x, see `sliding_angle`.
     """
     assert scene.terrain is not None
     below = surfaces_below(scene.terrain, outline)
     angle = min(scene.interface(own, name).friction_deg for name in below)
-    angle = sliding_angle(angle, base_inclination(scene.terrain, outline))
+    angle = sliding_angle(angle, inclination_deg)
     return sliding_resistance(-scene.gravity_vector[1], density, section(outline), angle)
-
-
-def base_inclination(terrain: Terrain, outline: Floats) -> float:
-    """Return the inclination of the ground between the ends of an outline [deg].
-
-    It is positive where the ground falls in the direction of x.
-    """
-    ends = np.array([outline[:, 0].min(), outline[:, 0].max()])
-    high, low = np.interp(ends, *terrain.points.T)
-    return math.degrees(math.atan2(high - low, ends[1] - ends[0]))
 
 
 def surfaces_below(terrain: Terrain, outline: Floats) -> list[str]:

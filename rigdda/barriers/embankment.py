@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Annotated, ClassVar, Self
 
@@ -145,7 +146,15 @@ class Embankment(Earthwork, frozen=True, tag="embankment"):
 
     def resistance(self, scene: Subsoil, outline: Floats) -> float:
         """Return the horizontal thrust at which it slides, see `base_friction` [N/m]."""
-        return base_friction(scene, self.density, scene.fill, outline)
+        assert scene.terrain is not None
+        inclination = self.base_inclination(scene.terrain, outline)
+        return base_friction(scene, self.density, scene.fill, outline, inclination)
+
+    def base_inclination(self, ground: Terrain, outline: Floats) -> float:
+        """Return the inclination of the ground between its ends, positive if it falls [deg]."""
+        left, right = float(outline[:, 0].min()), float(outline[:, 0].max())
+        fall = ground.height(left) - ground.height(right)
+        return math.degrees(math.atan2(fall, right - left))
 
     def idle_resistance(self, other: Barrier, resistance: float) -> float:
         """Return the thrust that it resists, in proportion to its weight [N/m]."""

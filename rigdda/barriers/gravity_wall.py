@@ -98,7 +98,16 @@ class GravityWall(Standing, frozen=True, tag="gravity_wall"):
 
     def resistance(self, scene: Subsoil, outline: Floats) -> float:
         """Return the horizontal thrust at which it slides, see `base_friction` [N/m]."""
-        return base_friction(scene, self.density, scene.barrier_surface, outline)
+        inclination = self.base_inclination(scene.terrain, outline)
+        return base_friction(scene, self.density, scene.barrier_surface, outline, inclination)
+
+    def base_inclination(self, ground: Terrain | None, outline: Floats) -> float:
+        """Return the inclination of its base, the first edge of its outline [deg].
+
+        It is positive if the base falls in the direction of x.
+        """
+        (left, high), (right, low) = outline[:2].tolist()
+        return math.degrees(math.atan2(high - low, right - left))
 
     def idle_resistance(self, other: Barrier, resistance: float) -> float:
         """Return the thrust that it resists, in proportion to its weight [N/m]."""

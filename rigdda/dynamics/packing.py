@@ -310,7 +310,8 @@ def pack_interfaces(scene: Scene, names: list[str]) -> Interfaces:
     The surfaces of fences and gravity walls come last. That of fences has no restitution, strength,
     friction and rolling resistance, because a net moves along with what it holds. That of gravity
     walls is the surface of barriers without rolling resistance, which would keep a wall from
-    overturning: its moment at the toe would add to that of the weight.
+    overturning: its moment at the toe would add to that of the weight. Blocks that touch a wall
+    have none there either.
     """
     movable = any(isinstance(b, Fence | GravityWall) for b in scene.barriers)
     own = names.index(scene.barrier_surface) if movable else 0

@@ -162,15 +162,16 @@ def rebound(
     plastic to full restitution is zero, the gain is therefore not positive.
 
     Contacts that friction locks, as those on both sides of a wedge, cannot open: the sweeps do not
-    converge, and their impulses exceed those of the impact. Then there is no restitution.
+    converge, and their impulses exceed those of the impact. Then there is no restitution, and if
+    the contacts are locked without it, too, the rebound is taken back.
     """
     rows.slot[n, BOUNCES] = 0.0  # what does not move is not struck
     struck = list_struck(rows, active)
     lost = work_from(rows, struck, FREE)
     start_rebound(rows, struck, h, touch)
     copy_velocities(rows.slot, n, NOW, BEFORE)
-    sweeps, share = 0, 1.0
-    for attempt in range(3):
+    sweeps, share, first = 0, 1.0, True
+    while True:
         aim_rebound(rows, n, struck, share)
         swept = settle(rows, n, struck, number, math.inf, tolerance)
         sweeps += swept
@@ -179,9 +180,11 @@ def rebound(
         locked = swept == MOST_SWEEPS and opened > impact
         if lost + work <= -ROUNDING * lost and not locked:
             break
-        share = min(max(-lost / work, 0.0), 1.0) if attempt == 0 and not locked else 0.0
-        if attempt == 2:  # the sweeps do not converge: no rebound
+        if share == 0.0:  # the sweeps do not converge: no rebound
             take_back(rows, n, struck)
+            break
+        share = min(max(-lost / work, 0.0), 1.0) if first and not locked else 0.0
+        first = False
     end_rebound(rows, struck)
     return sweeps
 

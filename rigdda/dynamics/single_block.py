@@ -153,7 +153,11 @@ def _near(corners: NDArray, boxes: NDArray) -> bool:
 
 @kernel
 def _set_interfaces(pairs: PairProperties, interfaces: Interfaces) -> None:
-    """Write the properties of pairs; fences come last, without friction and rolling resistance."""
+    """Write the properties of pairs of named surfaces.
+
+    The surfaces of fences and gravity walls, which follow, stay as they are: that of fences never
+    changes, and gravity walls are not among the barriers of single blocks.
+    """
     for i in range(len(interfaces)):
         for j in range(len(interfaces)):
             interface = interfaces[i, j]

@@ -266,9 +266,9 @@ def settle_safely(
 ) -> int:
     """Settle a substep without increasing the energy; return the sweeps.
 
-    If the sweeps do not converge, as where a heavy body squeezes a light one aside, they are
-    repeated from contacts without impulses and without extrapolation, which never increases the
-    energy.
+    If the sweeps neither converge nor lose energy, as where a heavy body squeezes a light one
+    aside, they are repeated from contacts without impulses and without extrapolation, which never
+    increases the energy.
     """
     sweeps = settle(rows, n, active, number, reach, tolerance)
     if sweeps < MOST_SWEEPS or kinetic(rows.slot, n, NOW) <= kinetic(rows.slot, n, FREE):
@@ -288,7 +288,8 @@ def extrapolate(rows: Rows, active: int, most: float) -> float:
     In Anderson's method of depth one (Anderson 1965), the next x is G - theta dG, where d is the
     change since the last extrapolation and theta = r dr / dr^2. It removes the error that decreases
     most slowly, as that of a heavy body that rests or falls on a light one. An extrapolation that
-    does not decrease the square of the residual by `PROGRESS` is taken back, and there is no other.
+    does not decrease the square of the residual by `PROGRESS` is taken back, and no
+    further extrapolation follows in these sweeps.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from rigdda import Barrier, Ditch, Embankment, Fence, GravityWall, Scene, Site, limit_equilibrium
 from rigdda.barriers import section
-from rigdda.barriers.base import ELEMENT, base_inclination, sliding_angle, surfaces_below
+from rigdda.barriers.base import ELEMENT, sliding_angle, surfaces_below
 from rigdda.barriers.gravity_wall import SLID
 from rigdda.envs.fence_checks import USE_ROUNDING, Action, Demand, FenceCheck
 from rigdda.envs.ritchie_ditch import RitchieDitch
@@ -189,7 +189,7 @@ class Base(NamedTuple):
         weight = gravity * barrier.density * section(outline)
         touched = "rock" if "rock" in scene.surfaces else next(iter(scene.surfaces))
         angle = min(scene.friction_deg(own, name) for name in below)
-        angle = sliding_angle(angle, base_inclination(scene.terrain, outline))
+        angle = sliding_angle(angle, barrier.base_inclination(scene.terrain, outline))
         return cls(
             weight=weight,
             width=barrier.thickness if isinstance(barrier, GravityWall) else 0.0,

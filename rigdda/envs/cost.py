@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import html
 import math
-import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -420,8 +419,8 @@ def judge_account(
     else:
         sums = _weighted(site, layout, found, facts, shares)
     annual = site.annual(layout)
-    known = [facts[name].debris if name in facts else math.nan for name in names]
-    without = math.fsum(map(operator.mul, map(site.rate, names), known))
+    rates = {name: site.rate(name) for name in names if site.rate(name) > 0.0}
+    without = math.fsum(r * (facts[n].debris if n in facts else math.nan) for n, r in rates.items())
     share = sums.volume.value / without if without else 0.0
     return Evaluation(
         layout=layout,

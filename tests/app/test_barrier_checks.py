@@ -14,7 +14,7 @@ from rigdda.agents.designers import rule
 from rigdda.agents.designers.menu import Menu
 from rigdda.app.barrier_checks import LayoutChecks, check_layout
 from rigdda.app.reports.design_report import check_notes
-from rigdda.barriers.base import base_inclination, surfaces_below
+from rigdda.barriers.base import surfaces_below
 from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.barrier_formulas import (
     PRESSURE_ON_ROCK,
@@ -112,8 +112,9 @@ def test_checks_use_the_mean_strength_of_the_ground(name: str) -> None:
     base = Base.of(site, wall)
     scene = mean_scene(site, (wall,))
     assert scene.terrain is not None
+    assert base.friction > 0.0  # else the angle of friction is not known
     angle = math.degrees(math.atan(base.friction))
-    angle += max(base_inclination(scene.terrain, scene.outline(0)), 0.0)
+    angle += max(wall.base_inclination(scene.terrain, scene.outline(0)), 0.0)
     assert min(abs(angle - one) for one in angles) < 1e-9
     assert base.restitution in {s.restitution for s in site.surfaces.values()}
     assert any(surface.friction_sd_deg > 0.0 for surface in site.surfaces.values())

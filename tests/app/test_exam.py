@@ -391,6 +391,8 @@ def test_a_specification_is_current_with_the_mechanics_of_its_references() -> No
     other = msgspec.structs.replace(known, mechanics="0ld")
     assert known.current and not other.current
     assert known.key != other.key
+    better = msgspec.structs.replace(known, reference_releases=10 * known.reference_releases)
+    assert better.key == known.key
 
 
 def test_intervals_of_few_tasks_are_not_given() -> None:

@@ -521,7 +521,7 @@ def test_without_barriers_rare_harm_has_an_interval(site: Site) -> None:
     found = judge(site, (), outcomes, facts, {})
     assert found.harm == 0.0 and found.harm_ci[1] > 0.0
     alone = judge(site, (), outcomes, {}, {})
-    assert alone.harm_ci == (0.0, 0.0)
+    assert alone.harm_ci == (0.0, 0.0) and math.isnan(alone.debris_share)
     assert not harmless or nothing.harm_ci[1] > nothing.harm
 
 

@@ -53,8 +53,8 @@ class Effect:
     stops, low, passes : (B,) arrays of bool
         Blocks that the barrier stops, blocks that pass below its top, and blocks that pass its
         station at all.
-    factor : (R,) array
-        Factor on the harm of each release [-], less than 1 for mesh.
+    factor : (E,) array
+        Factor on the harm of each event [-], less than 1 for mesh.
     mended : (R,) array
         Length of barrier to repair in each release [m].
     share : (E,) array
@@ -103,7 +103,7 @@ class Forecast:
         self._in_event = np.equal.outer(np.arange(len(names)), ensemble.event).astype(np.float64)
         risk = self._in_event @ self._base  # sum over releases, (E,)
         self._unseen, self._risk = risk <= 0.0, np.maximum(risk, 1e-12)
-        self._count = count = np.maximum(self._in_event.sum(axis=1), 1.0)
+        count = np.maximum(self._in_event.sum(axis=1), 1.0)
         self._event_numbers = np.column_stack(
             [
                 np.log10([largest(site, name) for name in names]),
@@ -123,13 +123,13 @@ class Forecast:
 
     def _effect(self, barrier: Barrier) -> Effect:
         site, count, blocks = self.problem.site, len(self.ensemble.event), len(self._keys)
-        none, ones, mended = np.zeros(blocks, dtype=bool), np.ones(count), np.zeros(count)
+        none, mended = np.zeros(blocks, dtype=bool), np.zeros(count)
+        ones = np.ones(len(self._risk))
         if isinstance(barrier, Mesh | Removal):
             factor = ones
             if isinstance(barrier, Mesh):
                 rates = [(site.rate(n, (barrier,)), site.rate(n, ())) for n in site.event_names]
-                each = np.array([own / usual if usual > 0.0 else 1.0 for own, usual in rates])
-                factor = each[self.ensemble.event]
+                factor = np.array([own / usual if usual > 0.0 else 1.0 for own, usual in rates])
             numbers = np.zeros((len(self._risk), BARRIER_FEATURES))
             return Effect(none, none, none, factor, mended, self._share(none, factor), numbers)
         k = int(np.argmin(np.abs(self.ensemble.stations - barrier.x)))
@@ -202,15 +202,15 @@ class Forecast:
         remains: Floats = np.asarray(self._whole - taken, dtype=np.float64)
         left: Floats = np.where(remains <= 1e-9 * self._whole, 0.0, remains)
         harm = left if self._free else self.effects.harm(left)
-        share = np.minimum(self._in_event @ (harm * factor) / self._risk, 1.0)
-        return np.where(self._unseen, self._in_event @ factor / self._count, share)
+        share = np.where(self._unseen, 1.0, self._in_event @ harm / self._risk)
+        return np.minimum(share * factor, 1.0)
 
     def analytic(self, layout: Layout) -> tuple[Floats, Floats, Floats]:
         """Return the remaining shares for stopped, low and passing blocks, each (E,)."""
         own = [self.effect(barrier) for barrier in layout]
         if len(own) == 1 and not own[0].passes.any():
             return own[0].share, own[0].share, own[0].share
-        factor = np.prod([e.factor for e in own], axis=0) if own else np.ones(len(self._whole))
+        factor = np.prod([e.factor for e in own], axis=0) if own else np.ones(len(self._risk))
         none = np.zeros(len(self._keys), dtype=bool)
         stops, low, passes = (
             self._share(np.logical_or.reduce([none, *(getattr(e, name) for e in own)]), factor)

@@ -58,12 +58,13 @@ class Specification(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def key(self) -> str:
-        """Hash of all values that determine a result.
+        """Hash of all values that determine the releases.
 
-        The effort of the search for the references is left out, so that better references do not
-        change the releases of the verification.
+        The references are left out, so that better ones do not change the releases of the
+        verification.
         """
-        own = {k: v for k, v in msgspec.structs.asdict(self).items() if k != "reference_releases"}
+        own = msgspec.structs.asdict(self)
+        own = {name: value for name, value in own.items() if not name.startswith("reference")}
         return hashlib.sha256(msgspec.json.encode(own)).hexdigest()[:16]
 
     def problem(self, site: str) -> DesignProblem:

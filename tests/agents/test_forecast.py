@@ -57,6 +57,20 @@ def test_features_are_finite_and_forecasts_are_shares(
     assert ((shares >= 0.0) & (shares <= 1.2)).all()
 
 
+def test_a_barrier_is_not_credited_for_events_that_were_not_seen(
+    problem: DesignProblem, crossings: CrossingEnsemble
+) -> None:
+    """Neither for those without a release nor for those of which no release reached the road."""
+    first, *others = problem.site.event_names
+    some = ensemble(problem.site, {first: range(7, 27)}, Menu(problem).stations)
+    assert others
+    forecast, menu = Forecast(problem, some), Menu(problem)
+    for barrier in menu.singles("fence")[::20]:
+        assert (forecast.analytic((barrier,))[0][1:] == 1.0).all()
+    assert (forecast.analytic(())[0] == 1.0).all()
+    assert any(forecast.analytic((b,))[0][0] < 1.0 for b in menu.singles("fence"))
+
+
 def test_arrivals_follow_the_remaining_risk(
     problem: DesignProblem, crossings: CrossingEnsemble
 ) -> None:

@@ -171,3 +171,14 @@ def test_the_resistance_on_a_slope_is_that_of_statics(slope_deg):
         weight = barrier.density * GRAVITY * abs(polygon_properties(scene.outline(0))[0])
         right = weight * math.tan(math.radians(max(33.0 - max(slope_deg, 0.0), 0.0)))
         assert scene.resistance(0) == pytest.approx(right, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(("edge", "stands"), [(0.6, True), (0.2, False)])
+def test_a_wall_at_the_edge_of_a_bench_resists_as_its_base_does(edge, stands):
+    """It stands on the level bench if its middle does, and on the slope beyond otherwise."""
+    ground = Terrain([(-60.0, 0.0), (edge, 0.0), (60.0, edge - 60.0)])
+    wall = GravityWall(0.0, 2.0, 1.0)
+    scene = Scene(ground, (box(-20.0, 5.0),), {"rock": Surface(33.0)}, barriers=(wall,))
+    weight = wall.density * GRAVITY * abs(polygon_properties(scene.outline(0))[0])
+    right = weight * math.tan(math.radians(33.0)) if stands else 0.0
+    assert scene.resistance(0) == pytest.approx(right)

@@ -11,7 +11,7 @@ import pytest
 
 import rigdda
 from rigdda import BadInput, Block, Ditch, Embankment, Fence, Layout, Site, Wall, sites
-from rigdda.dynamics.packing import NET, pack_interfaces
+from rigdda.dynamics.packing import NET, WALL, pack_interfaces
 from rigdda.ground.surface import Interface
 from rigdda.model.interfaces import ContactProperties
 from rigdda.model.site_tables import Scatter
@@ -83,6 +83,13 @@ def test_how_surfaces_meet(site, barriers):
             for field in ("friction", "restitution", "rolling"):
                 assert (fences[field] == 0.0).all()
             assert (fences["restitution_speed"] == np.inf).all()
+        if barriers:
+            wall, own = names + WALL, list(scene.surfaces).index(scene.barrier_surface)
+            for field in ("friction", "restitution", "restitution_speed"):
+                found = wanted[field][wall, :names]
+                np.testing.assert_array_equal(found, wanted[field][own, :names])
+            rolling = wanted["rolling"]
+            assert (rolling[wall] == 0.0).all() and (rolling[:, wall] == 0.0).all()
         least = min(surface.friction_deg for surface in scene.surfaces.values())
         assert properties.least_friction_deg == least
 

@@ -19,6 +19,7 @@ def sweep_boxes(bodies: Bodies, polygon: Polygons, boxes: Boxes, p: Parameters) 
     for i in range(len(bodies)):
         body, outline, grow = bodies[i], polygon[i], p.margin
         if body.status == AWAKE:
+            # a body that is struck within the step moves farther, and is detected in the next step
             body.path = top_speed(body) * p.dt
             grow += body.path + p.gravity * p.dt * p.dt
         box = boxes.swept[i]

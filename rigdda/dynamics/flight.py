@@ -9,6 +9,7 @@ bit-identical wherever a flight is interrupted.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -50,41 +51,56 @@ def time_to_fall(gap: float, speed: float, gravity: float) -> float:
 
 
 @kernel
+def time_to_segment(
+    body: Body, i: int, outlines: Outlines, one: Any, reach: float, most: float, p: Parameters
+) -> float:  # fmt: skip
+    """Return a lower bound on the time until the body may touch segment `one` [s], at most `most`.
+
+    It is the largest of three bounds: from the corners above the line of the segment, from the
+    circumscribed circle above that line, and from the distance of the circle to the segment. For
+    `reach`, see `steps_of_flight`.
+    """
+    x, y, r, later = body.x, body.y, body.radius, 2.0 * p.gravity * p.dt
+    nx, ny = one.normal_x, one.normal_y
+    closing = max(-(nx * body.vx + ny * body.vy), 0.0) + later
+    over = nx * (x - one.x) + ny * (y - one.y)
+    time = time_to_fall(over - r - reach, closing, p.gravity)
+    if time < most:
+        lowest = math.inf
+        for k in range(body.count):
+            corner = outlines.corner[i, k]
+            lowest = min(lowest, nx * (corner.x - one.x) + ny * (corner.y - one.y))
+        spin = closing + abs(body.omega) * r
+        time = max(time, time_to_fall(lowest - reach, spin, p.gravity))
+    if time < most:
+        along = min(max(ny * (x - one.x) - nx * (y - one.y), 0.0), one.length)
+        away = math.hypot(x - one.x - along * ny, y - one.y + along * nx)
+        speed = top_speed(body) + later
+        time = max(time, time_to_fall(away - r - reach, speed, p.gravity))
+    return min(most, time)
+
+
+@kernel
 def time_to_ground(
     body: Body, i: int, outlines: Outlines, ground: GroundArrays, reach: float, most: float,
     p: Parameters,
 ) -> float:  # fmt: skip
     """Return a lower bound on the time until the body may touch the ground [s], at most `most`.
 
-    For each segment it is the largest of three bounds: from the corners above the line of the
-    segment, from the circumscribed circle above that line, and from the distance of the circle to
-    the segment. For `reach`, see `steps_of_flight`.
+    The segments below the centroid come first, since their bound excludes most of the others.
     """
-    x, y, r, gravity = body.x, body.y, body.radius, p.gravity
-    later = 2.0 * gravity * p.dt
-    speed = top_speed(body) + later
-    for s in range(len(ground.segment) - 1):
-        one, around = ground.segment[s], r + reach + (speed + 0.5 * gravity * most) * most
-        if one.left > x + around or one.right < x - around:
-            continue
-        if one.bottom > y + around or one.top < y - around:
-            continue
-        nx, ny = one.normal_x, one.normal_y
-        closing = max(-(nx * body.vx + ny * body.vy), 0.0) + later
-        over = nx * (x - one.x) + ny * (y - one.y)
-        time = time_to_fall(over - r - reach, closing, gravity)
-        if time < most:
-            lowest = math.inf
-            for k in range(body.count):
-                corner = outlines.corner[i, k]
-                lowest = min(lowest, nx * (corner.x - one.x) + ny * (corner.y - one.y))
-            spin = closing + abs(body.omega) * r
-            time = max(time, time_to_fall(lowest - reach, spin, gravity))
-        if time < most:
-            along = min(max(ny * (x - one.x) - nx * (y - one.y), 0.0), one.length)
-            away = math.hypot(x - one.x - along * ny, y - one.y + along * nx)
-            time = max(time, time_to_fall(away - r - reach, speed, gravity))
-        most = min(most, time)
+    x, y, speed = body.x, body.y, top_speed(body) + 2.0 * p.gravity * p.dt
+    for others in range(2):
+        for s in range(len(ground.segment) - 1):
+            one = ground.segment[s]
+            if (one.left <= x and x <= one.right) == (others == 1):
+                continue
+            around = body.radius + reach + (speed + 0.5 * p.gravity * most) * most
+            if one.left > x + around or one.right < x - around:
+                continue
+            if one.bottom > y + around or one.top < y - around:
+                continue
+            most = time_to_segment(body, i, outlines, one, reach, most, p)
     return most
 
 

@@ -10,6 +10,7 @@ Judged by whether the difference of the debris share in the highway case is sign
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +73,8 @@ def run(quick: bool, out: Path) -> Number:
     write(out / "lumped_mass.csv", rows)
     draw(out / "lumped_mass.png", (14.0, 3.8), lambda figure: picture(figure, every))
     (blocks, half), (points, other) = shares[:2]
-    ratio = abs(points - blocks) / float(np.hypot(half, other))
+    interval = float(np.hypot(half, other))  # 0 if all of a few releases are alike
+    ratio = abs(points - blocks) / interval if interval > 0.0 else math.inf
     note = f"blocks {blocks:.3f} +- {half:.3f}, lumped mass {points:.3f} +- {other:.3f}"
     return Number(
         "difference of the debris share over its interval, highway", ratio, 1.0, note=note

@@ -453,11 +453,17 @@ class Scene:
         return self.gravity if isinstance(self.gravity, tuple) else (0.0, -self.gravity)
 
     def ground_without(self, gone: Collection[int]) -> Terrain | None:
-        """Return the ground after embankments among the barriers `gone` were pushed away."""
+        """Return the ground after embankments among the barriers `gone` were pushed away.
+
+        Earthworks in an embankment, such as a ditch in its crest, are lost with it.
+        """
         if self.terrain is None or len(gone) == 0:
             return self.ground
+        lost = [self.barriers[i] for i in gone if isinstance(self.barriers[i], Earthwork)]
         left = [
-            b for i, b in enumerate(self.barriers) if i not in gone or not isinstance(b, Earthwork)
+            b
+            for b in self.barriers
+            if not isinstance(b, Earthwork) or not any(b.x < e.end and b.end > e.x for e in lost)
         ]
         return self._with_pits(earthworks(self.terrain, left, self.fill)[0], left)
 

@@ -135,3 +135,14 @@ def test_a_fence_fails_under_a_jammed_mass(fence, dt):
     site = replace(site, motion=replace(site.motion, dt=dt, damping_when="contact", duration=12.0))
     (found,) = release(site, (fence,), 0, "mass")[1].barriers
     assert found.failed and found.state == "failed"
+
+
+def test_a_ditch_in_the_crest_of_an_embankment_is_lost_with_it():
+    """It could not be dug into the ground that is left."""
+    barriers = (DAM, Ditch(2.25, 0.4, 0.5, 0.2), Ditch(10.0, 1.0, 4.0))
+    scene = Scene(HALF, (box(-5.0, 8.0),), SURFACES, barriers=barriers)
+    left = scene.ground_without([0])
+    assert left is not None
+    assert [left.height(x) for x in (1.5, 2.5, 3.5)] == [0.0, 0.0, 0.0]
+    assert left.height(12.0) == -1.0
+    assert scene.ground_without([]) is scene.ground

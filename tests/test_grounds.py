@@ -18,7 +18,7 @@ from rigdda import (
     release_outcome,
     sites,
 )
-from rigdda.dynamics.packing import pack_interfaces
+from rigdda.dynamics.packing import NET, pack_interfaces
 from rigdda.envs import outcome_cache
 from rigdda.envs.outcome_cache import Memory
 from rigdda.ground.grounds import GROUNDS, OTHER, USUAL
@@ -141,8 +141,8 @@ def test_packed_pairs_have_rolling_resistance_and_speed_but_fences_have_not():
     assert packed["rolling"][rock, ground] == soil.rolling
     assert packed["restitution_speed"][rock, ground] == 8.0
     assert packed["restitution_speed"][rock, rock] == np.inf
-    for fences in (packed[len(names) :], packed[:, len(names) :]):
-        assert fences.size
+    net = len(names) + NET
+    for fences in (packed[net], packed[:, net]):
         assert (fences["rolling"] == 0.0).all() and (fences["friction"] == 0.0).all()
         assert (fences["restitution_speed"] == np.inf).all()
 

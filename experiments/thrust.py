@@ -84,6 +84,15 @@ def sentence(row: Row) -> str:
     return f"{words}: fails in {row['failed']:g} of {row['releases']:g} releases"
 
 
+def use(row: Row) -> float:
+    """Return the greatest thrust over the resistance [-].
+
+    It is infinite if there is no resistance, on a slope that is steeper than the friction angle.
+    """
+    thrust, resistance = row["greatest_thrust_kn"], row["resistance_kn"]
+    return float(thrust / resistance) if resistance > 0.0 else math.inf
+
+
 def picture(figure: Figure, rows: list[Row]) -> None:
     """Draw thrust over resistance against height; filled marks if every release fails."""
     names = list(dict.fromkeys(r["site"] for r in rows))
@@ -92,19 +101,19 @@ def picture(figure: Figure, rows: list[Row]) -> None:
         for kind, colour in COLOURS.items():
             own = [r for r in rows if r["site"] == name and r["kind"] == kind]
             for r in own:
-                ratio = r["greatest_thrust_kn"] / r["resistance_kn"]
                 gone = r["failed"] / r["releases"]
                 face = colour if gone == 1.0 else "none"
                 small = r["dt_ms"] < 10.0
                 axes.plot(
-                    r["height_m"], max(ratio, 1e-2), "s" if small else "o",
+                    r["height_m"], min(max(use(r), 1e-2), 1e3), "s" if small else "o",
                     color=colour, markerfacecolor=face, markersize=5 if small else 7,
                 )  # fmt: skip
             axes.plot([], [], "o", color=colour, label=kind.replace("_", " "))
         axes.axhline(1.0, color="0.8", zorder=0)
-        axes.set(title=f"mass of {name}", xlabel="height [m]", yscale="log")
+        axes.set(title=f"mass of {name}", xlabel="height [m]", yscale="log", ylim=(None, 5e4))
         axes.set_ylabel("greatest thrust over resistance [-]")
         words = "filled: fails in every release\nsquares: 2.5 ms; at 0.01: failed by a blow"
+        words += "\nat 1000: no resistance on a steep slope"
         axes.legend(title=words, fontsize=8, title_fontsize=8)
 
 
@@ -120,8 +129,8 @@ def run(quick: bool, out: Path) -> Number:
     rows = tabulate(out / "thrust.csv", cases, measure, sentence)
     draw(out / "thrust.png", (11.0, 4.5), lambda figure: picture(figure, rows))
     wrong = sum(r["stand_beyond_resistance"] for r in rows)
-    ratio = [r["greatest_thrust_kn"] / r["resistance_kn"] for r in rows]
-    note = f"thrust over resistance up to {max(ratio):.1f}" if math.isfinite(max(ratio)) else ""
+    finite = [use(row) for row in rows if math.isfinite(use(row))]
+    note = f"thrust over resistance up to {max(finite):.1f}" if finite else ""
     return Number("barriers that stand beyond their resistance", wrong, high=0.0, note=note)
 
 

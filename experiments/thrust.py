@@ -84,7 +84,7 @@ def sentence(row: Row) -> str:
     return f"{words}: fails in {row['failed']:g} of {row['releases']:g} releases"
 
 
-def use(row: Row) -> float:
+def utilisation(row: Row) -> float:
     """Return the greatest thrust over the resistance [-].
 
     It is infinite if there is no resistance, on a slope that is steeper than the friction angle.
@@ -105,7 +105,7 @@ def picture(figure: Figure, rows: list[Row]) -> None:
                 face = colour if gone == 1.0 else "none"
                 small = r["dt_ms"] < 10.0
                 axes.plot(
-                    r["height_m"], min(max(use(r), 1e-2), 1e3), "s" if small else "o",
+                    r["height_m"], min(max(utilisation(r), 1e-2), 1e3), "s" if small else "o",
                     color=colour, markerfacecolor=face, markersize=5 if small else 7,
                 )  # fmt: skip
             axes.plot([], [], "o", color=colour, label=kind.replace("_", " "))
@@ -129,7 +129,7 @@ def run(quick: bool, out: Path) -> Number:
     rows = tabulate(out / "thrust.csv", cases, measure, sentence)
     draw(out / "thrust.png", (11.0, 4.5), lambda figure: picture(figure, rows))
     wrong = sum(r["stand_beyond_resistance"] for r in rows)
-    finite = [use(row) for row in rows if math.isfinite(use(row))]
+    finite = [ratio for ratio in map(utilisation, rows) if math.isfinite(ratio)]
     note = f"thrust over resistance up to {max(finite):.1f}" if finite else ""
     return Number("barriers that stand beyond their resistance", wrong, high=0.0, note=note)
 

@@ -50,7 +50,8 @@ extrapolation. After two sweeps, several modes of error are left, and extrapolat
 PROGRESS = 0.01
 """Least decrease of the square of the residual by an extrapolation of impulses that is kept [-].
 Without it, impulses on a wedge that locks by friction grow without bounds, because its residual
-stays the same. With 0.1, a silo of 40 layers takes ten times as long to come to rest."""
+stays the same. With 0.1, a silo of 40 layers takes about ten times the processor time until it is
+at rest."""
 
 SAME_NORMAL = 0.7
 """Least cosine of the angle between the normals of a vertex's contacts in two successive steps for

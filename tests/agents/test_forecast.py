@@ -58,9 +58,9 @@ def test_features_are_finite_and_forecasts_are_shares(
 
 
 def test_a_barrier_is_not_credited_for_events_that_were_not_seen(
-    problem: DesignProblem, crossings: CrossingEnsemble
+    problem: DesignProblem,
 ) -> None:
-    """Neither for those without a release nor for those of which no release reached the road."""
+    """All of the risk of an event without releases remains."""
     first, *others = problem.site.event_names
     some = ensemble(problem.site, {first: range(7, 27)}, Menu(problem).stations)
     assert others

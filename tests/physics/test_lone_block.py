@@ -57,3 +57,21 @@ def test_a_bounce_takes_the_same_energy_at_every_step():
     kept, lost = energy_kept(0.5e-3)
     for dt in (1e-2, 5e-3, 2.5e-3):
         assert abs(energy_kept(dt)[0] - kept) < 0.02 * lost
+
+
+def test_a_flight_without_detection_ends_before_the_block_can_touch_anything():
+    """A second block that falls far away prevents flights, but does not change the motion."""
+    ground = Terrain([(-10.0, 12.0), (-4.0, 5.0), (3.0, 4.0), (9.0, -3.0), (900.0, -3.0)])
+    for seed in range(12):
+        (block,) = thrown(seed).blocks
+        block = Block(block.vertices + np.array([-6.0, 14.0]), velocity=block.velocity)
+        far = Block(block.vertices + np.array([800.0, 900.0]))
+        alone, both = (
+            Simulation(Scene(ground, blocks, rock(35.0, RESTITUTION)), Settings(dt=0.005))
+            for blocks in ((block,), (block, far))
+        )
+        for _ in range(6):
+            alone.step(100)
+            both.step(100)
+            np.testing.assert_array_equal(alone.poses[0], both.poses[0])
+        assert both.poses[1, 1] > 100.0  # it is still falling

@@ -96,4 +96,4 @@ def test_a_mass_in_static_mode_settles():
     start = sim.poses
     sim.step(200)
     moved = np.hypot(*(sim.poses - start)[:, :2].T)
-    assert np.median(moved) < 0.5 and moved.max() < 3.0  # about the size of a block
+    assert np.median(moved) < 0.5 and moved.max() < 3.0  # a single block may slide by 2.2 m

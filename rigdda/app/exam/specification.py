@@ -64,7 +64,8 @@ class Specification(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         verification.
         """
         own = msgspec.structs.asdict(self)
-        own = {name: value for name, value in own.items() if not name.startswith("reference")}
+        for name in ("references", "reference_releases"):
+            del own[name]
         return hashlib.sha256(msgspec.json.encode(own)).hexdigest()[:16]
 
     def problem(self, site: str) -> DesignProblem:

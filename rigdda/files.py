@@ -6,7 +6,7 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -60,6 +60,18 @@ def remove_parts(folder: Path) -> None:
     for part in (*folder.glob(name), *folder.glob(f"*/{name}")):
         with suppress(OSError):  # the file of another user does no harm
             part.unlink()
+
+
+def vector_twin(name: str) -> str:
+    """Return the name of the vector picture beside a picture, or the name of any other file."""
+    return f"{name.removesuffix('.png')}.svg" if name.endswith(".png") else name
+
+
+def remove_results(folder: Path, names: Iterable[str]) -> None:
+    """Remove results of an earlier run, and the vector pictures beside them."""
+    for name in names:
+        (folder / name).unlink(missing_ok=True)
+        (folder / vector_twin(name)).unlink(missing_ok=True)
 
 
 UNFINISHED = ".unfinished"

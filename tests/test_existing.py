@@ -80,6 +80,57 @@ def test_a_worn_fence_acts_as_one_of_its_remaining_capacity() -> None:
         assert found.barriers[0].resistance == 12.5e3 / 2.5
 
 
+def test_a_run_with_a_worn_fence_reads_back(tmp_path: Path) -> None:
+    run, _ = release(having(OLD), (NEW,), 0, "block")
+    run.save(tmp_path / "run.npz")
+    assert rigdda.Run.load(tmp_path / "run.npz").scene.barriers == run.scene.barriers
+
+
+def straight(band: tuple[float, float], road: float) -> Site:
+    """Return a site on a slope of 1:2 down to x = 80, with single blocks from a band."""
+    source = msgspec.structs.replace(LIGHT.sources[0], band=band)
+    slope = msgspec.structs.replace(
+        LIGHT.slope, points=((0.0, 40.0), (80.0, 0.0), (140.0, 0.0)), toe=20.0, surfaces=()
+    )
+    return msgspec.structs.replace(
+        LIGHT,
+        slope=slope,
+        sources=(source,),
+        events=tuple(e for e in LIGHT.events if e.source == source.name),
+        road=msgspec.structs.replace(LIGHT.road, start=road, end=road + 8.0),
+        barrier_zone=msgspec.structs.replace(LIGHT.barrier_zone, start=12.0, end=road - 0.5),
+    )
+
+
+LONG_SIDE = Existing("embankment", 20.0, 2.0, width=1.0, side_slope=1.0)
+"""Its downhill side begins at x = 23, 3.5 m above the slope of 1:2, and meets it at x = 30. On level
+ground, it would end at x = 25."""
+
+
+def test_the_foot_of_an_old_embankment_stays_off_the_road() -> None:
+    assert LONG_SIDE.barrier.works(straight((2.0, 4.0), 90.0).profile) == (20.0, 30.0)
+    near = msgspec.structs.replace(straight((2.0, 4.0), 30.0), existing=(LONG_SIDE,))
+    assert near.existing_barriers == (LONG_SIDE.barrier,)
+    with pytest.raises(BadInput, match=r"existing\[0\]\.x = 20\.0: put all of it, up to 30"):
+        msgspec.structs.replace(straight((2.0, 4.0), 29.5), existing=(LONG_SIDE,))
+
+
+def test_the_foot_of_an_embankment_stays_off_loose_rock() -> None:
+    site = straight((34.0, 36.0), 90.0)
+    assert site.built((LONG_SIDE.barrier,), 10.0)
+    hint = "put it outside the loose rock"
+    with pytest.raises(BadInput, match=rf"barriers\[0\]\.x = 24\.0: {hint}"):
+        site.built((msgspec.structs.replace(LONG_SIDE.barrier, x=24.0),), 10.0)
+    with pytest.raises(BadInput, match=rf"existing\[0\]\.x = 24\.0: {hint}"):
+        msgspec.structs.replace(site, existing=(msgspec.structs.replace(LONG_SIDE, x=24.0),))
+
+
+def test_the_section_of_a_site_with_rates_of_arrivals_is_drawn() -> None:
+    events = tuple(msgspec.structs.replace(e, rate_of="arrival") for e in LIGHT.events)
+    arriving = msgspec.structs.replace(LIGHT, events=events)
+    assert len(arriving.section((NEW,)).barriers) == 1
+
+
 def test_a_release_equals_that_of_the_same_barrier_in_a_layout(site: Site) -> None:
     """The outcome is that of a site without it and a layout with it, alone and in batches."""
     bare, (old,) = LIGHT, site.existing_barriers

@@ -172,6 +172,36 @@ def test_barriers_are_labelled_with_what_they_are_and_their_state_over_time(
     assert colours[0] != colours[1]
 
 
+def test_a_fence_deflects_and_sinks(run: Run, tmp_path: Path) -> None:
+    """It sinks by half its height over its elongation; frames without a change are not repeated."""
+    fence = Fence(20.0, 2.0, 4e5, elongation=4.0)
+    moved = with_barriers(run, fence, failed=())
+    moved.barrier_poses[10:, 0, 0] += 1.0
+    moved.barrier_poses[20:, 0, 0] += 1.0
+    moved.to_rerun(tmp_path / "a.rrd")
+    entity = "/world/barriers/0"
+    times = column(tmp_path / "a.rrd", entity, "sim_time")
+    assert [t.total_seconds() for t in times] == pytest.approx([0.0, 0.5, 1.0])
+    shapes = np.array(column(tmp_path / "a.rrd", entity, "Mesh3D:vertex_positions"))
+    strips = np.array(column(tmp_path / "a.rrd", entity, "LineStrips3D:strips"))[:, 0]
+    for k, way in enumerate((0.0, 1.0, 2.0)):
+        wanted = moved.scene.outline(0) + np.array([way, 0.0])
+        wanted[2:, 1] -= 0.25 * way
+        np.testing.assert_allclose(shapes[k, :, :2], wanted, rtol=1e-6)
+        np.testing.assert_allclose(strips[k, :4, :2], wanted, rtol=1e-6)
+        np.testing.assert_array_equal(strips[k, 4], strips[k, 0])
+
+
+def test_a_fence_that_deflects_and_fails_turns_pale(run: Run, tmp_path: Path) -> None:
+    moved = with_barriers(run, Fence(20.0, 2.0, 4e5), failed=((0, 0.5),))
+    moved.barrier_poses[10:, 0, 0] += 1.0
+    moved.to_rerun(tmp_path / "a.rrd")
+    stream = RrdReader(tmp_path / "a.rrd").stream().filter(content="/world/barriers/0")
+    names = [set(c.to_record_batch().schema.names) for c in stream.to_chunks() if not c.is_static]
+    assert any("Mesh3D:albedo_factor" in found for found in names)
+    assert any("Mesh3D:vertex_positions" in found for found in names)
+
+
 def test_a_gravity_wall_slides_then_is_overturned(run: Run) -> None:
     moved = with_barriers(run, GravityWall(27.0, 2.0, 1.0), failed=())
     moved.barrier_poses[10:, 0, 0] += 0.2

@@ -8,7 +8,7 @@ import re
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from rigdda.agents.limits import JOB_RELEASES, RELEASE_SEED
-from rigdda.files import LONGEST_NAME
+from rigdda.files import LONGEST_NAME, vector_twin
 
 if TYPE_CHECKING:
     from rigdda import Layout, Site
@@ -308,7 +308,7 @@ def _refuse_foreign(folder: Path, files: Sequence[str]) -> None:
         return
     known, command = read(folder), str(context.info_name)
     own = known.pop(command, None)
-    for file in files:
+    for file in dict.fromkeys((*files, *map(vector_twin, files))):
         writer = next((name for name, record in known.items() if file in record.files), None)
         if writer is not None:
             hint = f"`rigdda {writer}` wrote this file: name another folder"
@@ -318,6 +318,22 @@ def _refuse_foreign(folder: Path, files: Sequence[str]) -> None:
         else:
             continue
         raise BadInput("--out", str(folder / file), hint)
+
+
+def remove_earlier(folder: Path, files: Iterable[str]) -> None:
+    """Remove what earlier runs of the running command wrote into a folder, except `files`.
+
+    A report on the folder would otherwise show results of different runs together.
+    """
+    from rigdda.agents.run_record import read
+
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return
+    kept = {*files, *map(vector_twin, files)}
+    for name in _earlier(read(folder), str(context.info_name)):
+        if name not in kept:
+            (folder / name).unlink(missing_ok=True)
 
 
 def _part(name: str) -> str:

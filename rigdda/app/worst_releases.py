@@ -15,6 +15,7 @@ from rigdda.app.reports import pictures
 from rigdda.app.reports.tables import write_rows
 from rigdda.app.reports.wording import figure
 from rigdda.app.studies import Study
+from rigdda.files import remove_results
 
 WORST_FILES = ("worst.csv", "worst.png")
 """Files with the worst releases, beside those of the study."""
@@ -99,7 +100,7 @@ def write(folder: Path, study: Study, rows: Sequence[Mapping[str, str]], count: 
     table: list[dict[str, Any]] = [dict(zip(fields, one, strict=True)) for one in found]
     write_rows(folder / WORST_FILES[0], table, fields)
     if not found:
-        (folder / WORST_FILES[1]).unlink(missing_ok=True)
+        remove_results(folder, WORST_FILES[1:])
         return [WORST_FILES[0]]
     panels = []
     for one in found:

@@ -356,10 +356,6 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
         """Name of the kind in layout files."""
         return str(type(self).__struct_config__.tag)
 
-    def for_width(self, width: float) -> Self:
-        """Return an equivalent barrier per metre that resists an event of this width [m]."""
-        return self
-
     def _with(self, **values: float | None) -> Self:
         """Return a copy with other, valid values, which are not checked."""
         other = copy.copy(self)
@@ -380,6 +376,10 @@ def share_of(value: float, low: float, high: float) -> float:
 
 class Earthwork(Barrier, frozen=True):
     """A barrier that changes the ground."""
+
+    def for_width(self, width: float) -> Earthwork:
+        """Return an equivalent barrier per metre that resists an event of this width [m]."""
+        return self
 
     def build(self, ground: Terrain, surface: str) -> tuple[Floats, Terrain]:
         """Return the (n, 2) corners of the soil moved from or onto `ground`, and the new ground.
@@ -404,8 +404,10 @@ def base_friction(
 ) -> float:
     """Return the thrust in the direction of x that makes a body slide on the ground [N/m].
 
-    The friction is the least between its surface `own` and the surfaces under it. The inclination
-    of the base is positive where it falls in the direction of x, see `sliding_angle`.
+    The friction is the least of those that the scene has between its surface `own` and each of the
+    surfaces under it, see `Scene.interface`. In a release of a site, a fill on bare rock has that
+    of blocks of rock on soil. The inclination of the base is positive where it falls in the
+    direction of x, see `sliding_angle`.
     """
     assert scene.terrain is not None
     below = surfaces_below(scene.terrain, outline)
@@ -465,6 +467,10 @@ class Standing(Barrier, frozen=True):
         Length("height", "max_height"),
         Length("thickness", "max_thickness", "min_thickness", 0.5 * SIZE_STEP),
     )
+
+    def for_width(self, width: float) -> Standing:
+        """Return an equivalent barrier per metre that resists an event of this width [m]."""
+        return self
 
     @property
     def thickness(self) -> float:

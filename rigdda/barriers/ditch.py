@@ -86,13 +86,16 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
             If the ditch does not fit.
         """
         line = self._line(ground)
-        (left, _), (first, _), (last, _), (right, _) = line.tolist()
+        _, (first, _), (last, _), _ = line.tolist()
         if last - first < 1e-6:
-            least = first - left + right - last
+            least = self._least_width(ground)
+            mend = (
+                "less depth or steeper sides"
+                if least is None
+                else f"more than {least:g}, or less depth"
+            )
             raise BadInput(
-                "ditch width",
-                self.width,
-                f"give more than {least:g}, or less depth: its sides meet above the floor",
+                "ditch width", self.width, f"give {mend}: its sides meet above the floor"
             )
         return regrade("ditch x", ground, line, np.minimum, None)
 
@@ -104,6 +107,24 @@ class Ditch(Earthwork, frozen=True, tag="ditch"):
         first = left + self.side_slope * (high - floor)
         last = right - self.side_slope * (low - floor)
         return np.array([[left, high], [first, floor], [last, floor], [right, low]])
+
+    def _least_width(self, ground: Terrain) -> float | None:
+        """Return the width beyond which its floor has a width, if its sides meet [m].
+
+        A wider ditch on a slope also ends lower, so that its uphill side is longer. Returns None if
+        no greater width is enough on this ground.
+        """
+        along, level = ground.points.T
+        ahead = along > self.end
+        x = np.concatenate([[self.x, self.end], along[ahead]])
+        y = np.concatenate([np.interp(x[:2], along, level), level[ahead]])
+        floor = x - self.x - self.side_slope * (np.abs(y - y[0]) + 2.0 * self.depth)
+        wide = np.flatnonzero(floor[1:] > 0.0)
+        if not len(wide):
+            return None
+        k = int(wide[0]) + 1
+        share = floor[k] / (floor[k] - floor[k - 1])
+        return float(x[k] - share * (x[k] - x[k - 1])) - self.x
 
     def cut(self, ground: Terrain) -> tuple[float, float]:
         """Return the height of its uphill side and the width of its floor [m].

@@ -166,7 +166,7 @@ class Fence(Standing, frozen=True, tag="fence", omit_defaults=True):
             raise BadInput("fence elongation", self.elongation, hint)
         msgspec.structs.force_setattr(self, "elongation", found.elongation)
 
-    def for_width(self, width: float) -> Self:
+    def for_width(self, width: float) -> Fence:
         """Return the fence for a scene of this width [m], with a capacity instead of a class.
 
         The capacity is the class energy divided by the width, or by the panel length if that is
@@ -345,11 +345,15 @@ class WornFence(Fence, frozen=True, tag="fence", omit_defaults=True):
 
     condition: Annotated[Condition, about("Share of the energy of its class.", "-")] = 1.0
 
-    def for_width(self, width: float) -> Self:
-        """Return the fence for a scene of this width [m], see `Fence.for_width`."""
-        new = super().for_width(width)
-        if new is self or new.capacity is None:
-            return self
+    def for_width(self, width: float) -> Fence:
+        """Return the fence for a scene of this width [m], see `Fence.for_width`.
+
+        It is no longer a worn fence: its capacity is what is left of that of its class.
+        """
+        kind = self.energy_class
+        new = Fence(self.x, self.height, energy_class=kind, thickness=self.thickness)
+        new = new.for_width(width)
+        assert new.capacity is not None
         return new._with(capacity=self.condition * new.capacity)
 
     @property

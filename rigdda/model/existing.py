@@ -15,6 +15,7 @@ import msgspec
 
 from rigdda import fields
 from rigdda.barriers import (
+    KINDS,
     Barrier,
     Built,
     Earthwork,
@@ -140,11 +141,23 @@ def _barrier(existing: Existing, where: str) -> Built:
     elif existing.condition < 1.0:
         hint = f"leave it out: give the sizes that the {existing.kind.replace('_', ' ')} has today"
         raise BadInput(f"{where}.condition", existing.condition, hint)
+    _check_sizes(existing, where)
     found = from_table(where, given)
     assert isinstance(found, Built)
     if isinstance(found, Fence) and existing.condition < 1.0:
         return WornFence(**msgspec.structs.asdict(found), condition=existing.condition)
     return found
+
+
+def _check_sizes(existing: Existing, where: str) -> None:
+    """Check that only sizes of its kind are given; errors begin with `where`."""
+    fields_of_kind = KINDS[existing.kind].__struct_fields__
+    own = [name for name in SIZES if name in fields_of_kind]
+    for name in SIZES:
+        if getattr(existing, name) is not None and name not in own:
+            words = existing.kind.replace("_", " ")
+            hint = f"leave it out: the keys for the sizes of a {words} are {', '.join(own)}"
+            raise BadInput(f"{where}.{name}", getattr(existing, name), hint)
 
 
 def barriers(existing: Sequence[Existing]) -> tuple[Built, ...]:
@@ -184,17 +197,15 @@ def check_existing(
         if not low <= barrier.x <= high:
             hint = f"put it on the slope, at least {chainage(low)} and at most {chainage(high)}"
             raise BadInput(f"{where}.x", barrier.x, hint)
-        if barrier.end > road:
-            hint = (
-                f"put all of it, up to {chainage(barrier.end)}, uphill of the road, which begins at"
-            )
-            raise BadInput(f"{where}.x", barrier.x, f"{hint} {chainage(road)}")
         try:
             if isinstance(barrier, Earthwork):
                 earthworks(ground, (barrier,), soil)
             works = barrier.works(ground)
         except BadInput as bad:
             raise BadInput(f"{where}: {bad.field}", bad.value, bad.hint) from None
+        if works[1] > road:
+            hint = f"put all of it, up to {chainage(works[1])}, uphill of the road, which begins at"
+            raise BadInput(f"{where}.x", barrier.x, f"{hint} {chainage(road)}")
         for other, span in found:
             if works[0] < span[1] and span[0] < works[1]:
                 hint = (

@@ -266,11 +266,9 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
                 self.mesh(barrier.option)
             if not isinstance(barrier, Built):
                 continue
+            start, end = barrier.works(self.profile) if taken else (0.0, 0.0)
             for low, high in taken:
-                if (
-                    barrier.x < high - ENCODING_ROUNDING
-                    and barrier.x + barrier.extent > low + ENCODING_ROUNDING
-                ):
+                if start < high - ENCODING_ROUNDING and end > low + ENCODING_ROUNDING:
                     hint = f"put it outside the loose rock at x = {low:.2f} to {high:.2f}"
                     raise BadInput(f"barriers[{i}].x", barrier.x, hint)
             found.append(barrier.for_width(width))
@@ -547,7 +545,8 @@ class Site(SiteTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
         BadInput
             If a barrier does not stand on the slope or overlaps loose rock.
         """
-        scene, old = self.realise(layout), self.existing_barriers
+        # barriers stand at the same place in each event, and rates may not be known
+        scene, old = self.realise(layout, event=self.event_names[0]), self.existing_barriers
         barriers = [
             display.Outline(
                 scene.outline(i), words + describe(barrier), barrier.drawn != "line", bool(words)

@@ -66,6 +66,9 @@ class RecordedMotion(Protocol):
     def passed(self, x: float) -> NDArray[np.bool_]:
         """Return whether each block has been at or past a chainage by each frame."""
 
+    def outline(self, barrier: int, frame: int) -> Floats:
+        """Return the (n, 2) corners of a barrier in a frame [m]."""
+
     def failure(self, barrier: int) -> float:
         """Return the time at which a barrier failed, inf if it did not fail [s]."""
 
@@ -389,7 +392,7 @@ def _log_setting(rec: rr.RecordingStream, world: str, run: RecordedMotion, marks
 def _log_barrier(
     rec: rr.RecordingStream, entity: str, clock: Clock, run: RecordedMotion, i: int
 ) -> None:
-    """Log barrier `i`: gravity walls move, failed barriers turn pale, ditches are lines."""
+    """Log barrier `i`: walls and fences move, failed barriers turn pale, ditches are lines."""
     barrier, z = run.scene.barriers[i], LAYER["barriers"]
     outline = run.scene.outline(i)
     if barrier.drawn == "line":
@@ -403,11 +406,35 @@ def _log_barrier(
         _log_motion(rec, entity, clock(run.times), run.barrier_poses[:, i], z)
         return
     failure = run.failure(i)
-    whole = shapely.Polygon(outline)
-    _log_shape(rec, entity, whole, z, BARRIER_RGB if np.isinf(failure) else None)
+    colour = BARRIER_RGB if np.isinf(failure) else None
+    if np.ptp(run.barrier_poses[:, i, 0]) > 0.0:
+        _log_deflection(rec, entity, clock, run, i, colour)
+    else:
+        _log_shape(rec, entity, shapely.Polygon(outline), z, colour)
     if np.isfinite(failure):
         when = clock([run.times[0], failure])
         rec.send_columns(entity, when, rr.Mesh3D.columns(albedo_factor=[BARRIER_RGB, BROKEN_RGB]))
+
+
+def _log_deflection(
+    rec: rr.RecordingStream, entity: str, clock: Clock, run: RecordedMotion, i: int,
+    colour: Colour | None,
+) -> None:  # fmt: skip
+    """Log barrier `i`, a fence, in each frame in which its outline differs from the last one."""
+    place = run.barrier_poses[:, i, 0]
+    frames = np.flatnonzero(np.diff(place, prepend=np.nan) != 0.0)
+    corners = np.array([run.outline(i, int(frame)) for frame in frames])
+    fill = np.insert(corners, 2, LAYER["barriers"], axis=2)
+    edge = np.insert(np.concatenate([corners, corners[:, :1]], axis=1), 2, LAYER["barriers"] + EDGE,
+                     axis=2)  # fmt: skip
+    triangles = [(0, 1, 2), (0, 2, 3)]
+    faces = rr.Mesh3D.from_fields(triangle_indices=triangles, albedo_factor=colour)
+    line = rr.LineStrips3D.from_fields(colors=INK, radii=rr.Radius.ui_points(0.6))
+    rec.log(entity, faces, line, static=True)
+    positions = rr.Mesh3D.columns(vertex_positions=fill.reshape(-1, 3))
+    strips = rr.LineStrips3D.columns(strips=edge)
+    when = clock(run.times[frames])
+    rec.send_columns(entity, when, [*positions.partition([fill.shape[1]] * len(frames)), *strips])
 
 
 def _log_state(

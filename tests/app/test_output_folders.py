@@ -94,3 +94,75 @@ def test_another_study_does_not_replace_the_results_of_the_first(folder: Path) -
     assert (folder / "results/study.csv").read_bytes() == before
     (folder / "a.toml").write_text(study.replace("ditch", "pit"), encoding="utf-8")
     run("study", folder / "a.toml", "--out", folder / "results", folder=folder)
+
+
+@pytest.mark.parametrize("name", ["risk.csv", "frontier.png", "frontier.svg", "band.csv"])
+def test_files_that_a_design_writes_only_sometimes_are_not_replaced(
+    name: str, folder: Path
+) -> None:
+    own = folder / "results" / name
+    own.parent.mkdir()
+    own.write_text("my own data", encoding="utf-8")
+    line = refused("design", "site.toml", "--budget", 20, "--out", "results", folder=folder)
+    assert name in line and "`rigdda design` wrote this file" in line
+    assert own.read_text(encoding="utf-8") == "my own data"
+
+
+STUDY = 'site = "site.toml"\nreleases = 2\n[[layouts]]\nname = "ditch"\nfile = "layout.toml"\n'
+
+
+@pytest.mark.parametrize("name", ["risk.csv", "worst.csv", "worst.svg", "costs.svg"])
+def test_files_that_a_study_writes_only_sometimes_are_not_replaced(name: str, folder: Path) -> None:
+    (folder / "a.toml").write_text(STUDY, encoding="utf-8")
+    own = folder / "results" / name
+    own.parent.mkdir()
+    own.write_text("my own data", encoding="utf-8")
+    line = refused("study", "a.toml", "--out", "results", folder=folder)
+    assert name in line and "`rigdda study` wrote this file" in line
+    assert own.read_text(encoding="utf-8") == "my own data"
+
+
+def test_a_repeated_study_keeps_no_worst_releases_of_an_earlier_one(folder: Path) -> None:
+    (folder / "a.toml").write_text(STUDY, encoding="utf-8")
+    run("study", "a.toml", "--worst", 1, "--out", "results", folder=folder)
+    assert {"worst.csv", "worst.png", "worst.svg"} <= {
+        f.name for f in (folder / "results").iterdir()
+    }
+    run("study", "a.toml", "--seed", 9, "--out", "results", folder=folder)
+    left = {file.name for file in (folder / "results").iterdir()}
+    assert not any(name.startswith("worst") for name in left)
+    assert set(run_record.read(folder / "results")["study"].files) <= left
+
+
+def test_a_repeated_simulation_keeps_no_results_of_an_earlier_one(folder: Path) -> None:
+    simulate(folder, "results", "--station", 25)
+    assert (folder / "results/station_25m.svg").exists()
+    own = folder / "results/notes.txt"
+    own.write_text("mine", encoding="utf-8")
+    simulate(folder, "results", "--station", 30)
+    left = {file.name for file in (folder / "results").iterdir()}
+    assert {"station_30m.png", "station_30m.svg", "notes.txt"} <= left
+    assert not any(name.startswith("station_25m") for name in left)
+    assert set(run_record.read(folder / "results")["simulate"].files) <= left
+    simulate(folder, "results", "--model", "lumped")
+    left = {file.name for file in (folder / "results").iterdir()}
+    assert {"points.csv", "notes.txt"} <= left
+    assert not any(name.endswith((".png", ".svg", ".parquet")) for name in left)
+
+
+def test_a_report_replaces_only_a_report(folder: Path) -> None:
+    simulate(folder, "results")
+    run("report", "results", "--out", "pages", folder=folder)
+    run("report", "results", "--out", "pages", folder=folder)
+    (folder / "pages/report.html").write_text("<p>mine</p>", encoding="utf-8")
+    line = refused("report", "results", "--out", "pages", folder=folder)
+    assert "report.html: this file is not a report of rigdda" in line.replace("'", "")
+    assert (folder / "pages/report.html").read_text(encoding="utf-8") == "<p>mine</p>"
+
+
+def test_a_conversion_does_not_replace_a_replay(folder: Path) -> None:
+    simulate(folder, "results")
+    (folder / "results/run.rrd").write_text("mine", encoding="utf-8")
+    line = refused("replay", "results/run.npz", folder=folder)
+    assert "run.rrd" in line and "move it away" in line
+    assert (folder / "results/run.rrd").read_text(encoding="utf-8") == "mine"

@@ -119,6 +119,23 @@ def test_what_does_not_fit_is_refused(barrier, field, mend):
     assert caught.value.field == field
 
 
+@pytest.mark.parametrize(("fall", "side"), [(0.1, 0.5), (0.5, 1.0), (0.5, 1.9), (0.9, 1.0)])
+def test_the_least_width_of_a_ditch_on_a_slope(fall, side):
+    """The floor has the width W - s (2 d + W t) on a slope t, with sides s and a depth d."""
+    slope, depth = Terrain([(0.0, 200.0 * fall), (200.0, 0.0)]), 1.5
+    least = 2.0 * side * depth / (1.0 - side * fall)
+    with pytest.raises(BadInput, match=f"give more than {least:g}, or less depth"):
+        earthworks(slope, [Ditch(10.0, depth, 0.9 * least, side)], "soil")
+    earthworks(slope, [Ditch(10.0, depth, least + 0.01, side)], "soil")
+
+
+@pytest.mark.parametrize("width", [2.0, 20.0])
+def test_a_ditch_that_no_width_makes_possible(width):
+    slope = Terrain([(0.0, 200.0), (200.0, 0.0)])
+    with pytest.raises(BadInput, match="give less depth or steeper sides"):
+        earthworks(slope, [Ditch(10.0, 1.5, width, 1.0)], "soil")
+
+
 def test_faces_and_overhangs_are_refused():
     for points in (
         [(0, 10), (6, 10), (6, 0), (30, 0)],

@@ -28,7 +28,7 @@ from rigdda.app.terminal import (
     show_risks,
     warn_of_placeholders,
 )
-from rigdda.files import remove_unfinished
+from rigdda.files import remove_results, remove_unfinished
 
 if TYPE_CHECKING:
     from rigdda.agents.designers.store import Store
@@ -146,6 +146,7 @@ def design(
     from rigdda.app import design as job
     from rigdda.app import value_origins
     from rigdda.app.reports import design_report as report
+    from rigdda.app.reports.tables import RISKS
     from rigdda.app.uncertainty.parameters import read_posterior
 
     if posterior is not None and not grounds:
@@ -153,7 +154,8 @@ def design(
         raise click.UsageError(f"{words}--ground-samples above 0")
     problem = _pose(site, kinds, (target, failure, target_risk), max_cost, zone, checks)
     fitted = None if posterior is None else read_posterior(posterior, problem.site)
-    files = *report.DESIGN_FILES, *report.BAND_FILES, PROBLEM_FILE
+    optional = *report.BAND_FILES, *report.FRONTIER_FILES, RISKS
+    files = *report.DESIGN_FILES, *optional, PROBLEM_FILE
     folder = folder_for(out, f"design-{problem.site.name}", *files)
     with recorded_run(folder, problem.site):
         record_problem(folder, problem, *report.DESIGN_FILES)
@@ -168,6 +170,7 @@ def design(
             )  # fmt: skip
             tick(total, "pictures")
             report.write_design(done, folder, seed)
+        remove_results(folder, report.BAND_FILES)
         band = _on_other_grounds(done, grounds, fitted, seed, folder) if grounds else None
     _tell(done, store, folder)
     if band is not None:

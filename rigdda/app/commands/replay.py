@@ -35,6 +35,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     FILE.rrd and opened. For a site, one release is simulated and episode.rrd is written.
     """
     import rigdda
+    from rigdda import BadInput
     from rigdda.app.released import released
     from rigdda.app.reports import findings
     from rigdda.envs.replay_record import release_record
@@ -47,6 +48,9 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     if file.suffix == ".npz":
         run = rigdda.Run.load(file)
         file = file.with_suffix(".rrd")
+        if file.exists():
+            hint = f"open it with `rigdda replay {file}`, or move it away to convert {target} again"
+            raise BadInput("replay", str(file), hint)
         run.to_rerun(file, Marks(title=file.stem))
     if file.suffix == ".rrd":
         open_viewer(file)

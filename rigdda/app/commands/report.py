@@ -11,6 +11,24 @@ from rigdda.app.terminal import (
     folder_for,
 )
 
+GENERATOR = '<meta name="generator" content="rigdda">'
+"""Line of every report, by which it is told from a file of the user."""
+
+
+def _check_own(file: Path) -> None:
+    """Check that a file of the name of the report is a report.
+
+    Raises
+    ------
+    BadInput
+        If it is another file.
+    """
+    from rigdda import BadInput
+
+    if file.is_file() and GENERATOR not in file.read_text("utf-8", "replace")[:1000]:
+        hint = "this file is not a report of rigdda: move it away or name another folder"
+        raise BadInput("--out", str(file), hint)
+
 
 @click.command()
 @click.argument("results", nargs=-1, required=True, type=click.Path(path_type=Path))
@@ -37,7 +55,9 @@ def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) 
     replay = html_blocks.replay_of(folders) if serve else None
     page = html_report.compose(folders)
     files = (html_report.REPORT_FILE, "report.pdf") if pdf else (html_report.REPORT_FILE,)
-    file = html_report.write_report(page, folder_for(out or results[0], "", *files))
+    folder = folder_for(out or results[0], "", *files)
+    _check_own(folder / html_report.REPORT_FILE)
+    file = html_report.write_report(page, folder)
     click.echo(file)
     if program is not None:
         click.echo(browser.print_pdf(program, file))

@@ -17,6 +17,7 @@ from rigdda.app.terminal import (
     progress,
     read_layout,
     recorded_run,
+    remove_earlier,
     seed_option,
     show,
     warn_of_placeholders,
@@ -82,6 +83,7 @@ def simulate(
         folder = folder_for(out, f"simulate-{where.name}", "points.csv")
         with recorded_run(folder, where):
             tables.write_points(folder / "points.csv", seeds, points)
+            remove_earlier(folder, ["points.csv"])
         show(tables.points(points))
         note(findings.unfitted(where))
         note(findings.of_layout(where, barriers, event))
@@ -89,7 +91,8 @@ def simulate(
         return
     where.realise(barriers, seed, event)  # report an impossible layout before making a folder
     asked = check_stations(where, at or (where.road.start,))
-    folder = folder_for(out, f"simulate-{where.name}", *simulation_report.files(asked.tolist()))
+    files = simulation_report.files(asked.tolist())
+    folder = folder_for(out, f"simulate-{where.name}", *files)
     with recorded_run(folder, where), progress(releases) as tick:
         lines = simulation_report.lines(where, asked)
         found = job.simulate(where, barriers, seeds, event, lines.tolist(), folder, tick)
@@ -99,6 +102,7 @@ def simulate(
         passing = Passing.of(where, barriers, event, found.passages)
         rows, rest = simulation_report.write(folder, passing, barriers, asked)
         remove_unfinished(folder)
+        remove_earlier(folder, files)
     show(tables.outcomes(where, barriers, found.outcomes, stations.stopped(rest)))
     for line, table in stations.tables(rows):
         click.echo(line)

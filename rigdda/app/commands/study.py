@@ -20,6 +20,7 @@ from rigdda.app.terminal import (
     show,
     warn_of_placeholders,
 )
+from rigdda.files import remove_results
 
 
 @click.command()
@@ -46,11 +47,12 @@ def study(file: str, seed: int, worst: int, out: Path | None) -> None:
 
     from rigdda.app import studies, worst_releases
     from rigdda.app.released import released
-    from rigdda.app.reports import findings, study_report
+    from rigdda.app.reports import findings, study_report, tables
 
     asked = studies.load(file)
     asked = replace(asked, site=released(asked.site))
-    folder = folder_for(out, f"study-{Path(file).stem}", "study.csv", *study_report.STUDY_FILES)
+    files = "study.csv", *study_report.STUDY_FILES, tables.RISKS, *worst_releases.WORST_FILES
+    folder = folder_for(out, f"study-{Path(file).stem}", *files)
     _check_same_study(folder, file)
     with recorded_run(folder, asked.site), progress(asked.size) as tick:
         resumed = studies.run(asked, seed, folder / "study.csv", tick)
@@ -60,6 +62,8 @@ def study(file: str, seed: int, worst: int, out: Path | None) -> None:
         if worst:
             rows = studies.releases(asked, folder / "study.csv")
             worst_releases.write(folder, asked, rows, worst)
+        else:
+            remove_results(folder, worst_releases.WORST_FILES)
     click.echo("Z, capital, harm, repair: EUR per metre and year; to build: EUR per metre")
     show(study_report.costs(found))
     click.echo(

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import msgspec
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rigdda import (
     BadInput,
@@ -23,6 +26,7 @@ from rigdda import (
     sites,
 )
 from rigdda.ground.surface import Interface
+from rigdda.ground.terrain import Terrain
 from rigdda.model import loose_blocks
 from rigdda.model.site_tables import Motion, Road, Slope, Stretch
 
@@ -187,6 +191,43 @@ def test_a_stretch_of_the_slope_has_its_own_surface():
     assert names == ("rock", "soil", "soil", "rock")
     with pytest.raises(BadInput, match=r"surfaces\[1\].start"):
         replace(slope, surfaces=(Stretch(4, 20, "soil"), Stretch(19, 30, "rock")))
+
+
+BENDS = ((0.0, 60.0), (10.0, 50.0), (10.0, 30.0), (40.0, 5.0), (60.0, 0.0), (140.0, -1.0))
+WITHIN = st.floats(-0.45e-9, 0.45e-9)
+
+
+@given(
+    ends=st.lists(st.sampled_from((10.0, 25.0, 40.0, 60.0, 140.0)), min_size=2, max_size=4,
+                  unique=True).map(sorted),
+    shifts=st.lists(st.tuples(WITHIN, WITHIN), min_size=3, max_size=3),
+)  # fmt: skip
+def test_ends_of_stretches_within_rounding_of_a_corner_are_at_the_corner(ends, shifts):
+    exact, near = [], []
+    for (start, end), (one, other), name in zip(pairwise(ends), shifts, "abc", strict=False):
+        exact.append(Stretch(start, end, name))
+        near.append(Stretch(start + one, end + other, name))
+    points, names = Slope(BENDS, 10.0, "rock", tuple(exact)).chain()
+    found, found_names = Slope(BENDS, 10.0, "rock", tuple(near)).chain()
+    assert found_names == names
+    np.testing.assert_allclose(found, points, rtol=0.0, atol=2e-9)
+    Terrain(found, found_names)
+    corners = [point for point in found if point[0] != pytest.approx(25.0)]
+    assert corners == list(BENDS)
+
+
+@pytest.mark.parametrize("at", [40.0, 20.0])
+def test_a_stretch_shorter_than_rounding_has_no_effect(at):
+    tiny = Slope(BENDS, 10.0, "rock", (Stretch(at, at + 1e-10, "soil"),))
+    assert set(tiny.chain()[1]) == {"rock"}
+    assert Terrain(*tiny.chain()).height(at) == pytest.approx(Terrain(BENDS).height(at))
+
+
+def test_a_site_whose_stretch_begins_beside_a_corner_is_valid():
+    near = replace(VERGE.slope.surfaces[0], start=VERGE.slope.surfaces[0].start + 1e-10)
+    stretches = (near, *VERGE.slope.surfaces[1:])
+    site = replace(VERGE, slope=replace(VERGE.slope, surfaces=stretches))
+    assert site.slope.chain() == VERGE.slope.chain()
 
 
 def test_the_surface_of_the_ground_decides():

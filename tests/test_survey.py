@@ -11,6 +11,7 @@ import jsonschema
 import msgspec
 import numpy as np
 import pytest
+import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -514,3 +515,122 @@ def test_the_curve_of_a_spline_of_release_12_is_read_and_not_its_frame(tmp_path)
     line.append_formatted_vertices(TALUS, format="xy", dxfattribs={"flags": 8})
     save()
     assert np.abs(read_survey(tmp_path / "survey.dxf").points - TALUS).max() < 1e-9
+
+
+STEP = ((0.0, 50.0), (10.0, 40.0), (20.0, 35.0), (20.0, 10.0), (45.0, 0.0), (120.0, -2.0))
+"""Ground with a vertical face at the lower end of a stretch from 10 m to 20 m."""
+
+LEDGE = ((0.0, 50.0), (10.0, 48.0), (10.0, 40.0), (25.0, 10.0), (45.0, 0.0), (120.0, -2.0))
+"""Ground with a vertical face at the upper end of a stretch from 10 m to 25 m."""
+
+
+def ground(points) -> shapely.Polygon:
+    """Return the ground below some corners, down to 50 m below zero."""
+    return shapely.Polygon([*points, (points[-1][0], -50.0), (points[0][0], -50.0)])
+
+
+def check_taken_out(site: Site, points) -> None:
+    """Check that the ground and the masses of a site are together the surveyed ground."""
+    left, surveyed = ground(site.slope.points), ground(points)
+    rock = [shapely.Polygon(source.polygon) for source in site.sources]
+    assert left.is_valid
+    assert sum(part.area for part in rock) == pytest.approx(surveyed.area - left.area, abs=1e-6)
+    assert shapely.union_all([left, *rock]).symmetric_difference(surveyed).area < 1e-6
+
+
+def with_masses(folder: Path, points, *masses: str, road=(60.0, 67.0)) -> Site:
+    """Return the site of a surveyed profile without the rock of some masses."""
+    text = "\n".join(["chainage,elevation", *(f"{x!r},{y!r}" for x, y in points), ""])
+    request = SiteRequest(road=road, masses=masses)
+    return loaded(compose("made", survey_file(folder, text, "masses.csv"), request)[0])
+
+
+@pytest.mark.parametrize(
+    ("points", "mass", "corners", "ground_corners"),
+    [
+        (STEP, "m:10-20:30", [(10, 40), (20, 35), (20, 10), (10, 15.774)], STEP[:2]),
+        (STEP, "m:12-20:30", [(12, 39), (20, 35), (20, 10), (12, 14.619)], [*STEP[:2], (12, 39)]),
+        (LEDGE, "m:10-25:30", [(10, 40), (25, 10), (10, 18.66)], LEDGE[:2]),
+    ],
+)
+def test_both_corners_of_a_vertical_face_belong_to_a_mass(
+    points, mass, corners, ground_corners, tmp_path
+):
+    site = with_masses(tmp_path, points, mass)
+    np.testing.assert_allclose(site.sources[0].polygon, corners, atol=1e-9)
+    beyond = points.index(tuple(map(float, corners[-2])))
+    np.testing.assert_allclose(
+        site.slope.points, [*ground_corners, corners[-1], *points[beyond:]], atol=1e-9
+    )
+    check_taken_out(site, points)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize(
+    "points",
+    [STEP, (*STEP[:3], (20.0, 34.0), *STEP[4:]), ((0.0, 50.0), (10.0, 40.0), (20.0, 32.0),
+     (20.0, 34.0), *STEP[4:])],
+)  # fmt: skip
+def test_masses_may_meet_at_a_vertical_face(points, reverse, tmp_path):
+    masses = ["above:10-20:5", "below:20-30:5"]
+    site = with_masses(tmp_path, points, *(masses[::-1] if reverse else masses))
+    check_taken_out(site, points)
+
+
+@st.composite
+def faces(draw):
+    """Return corners of ground with a convex face, and the ends of a stretch of it [m].
+
+    The ends may be at vertical faces, of which that at the upper end may rise downhill.
+    """
+    metres = st.integers(1, 9).map(float)
+    slopes = sorted(draw(st.lists(st.integers(1, 30), min_size=1, max_size=4)))
+    points = [(0.0, 0.0), (draw(metres), -1.0)]
+    step = draw(st.sampled_from((0.0, -1.0, 0.5)))
+    x, y = points[-1][0], points[-1][1] + step
+    points += [(x, y)] if step else []
+    for slope in slopes:
+        run = draw(metres)
+        x, y = x + run, y - 0.1 * slope * run
+        points.append((x, y))
+    if drop := draw(st.sampled_from((0.0, 1.0, 12.0))):
+        y -= drop
+        points.append((x, y))
+    low = points[1][0] + draw(st.sampled_from((0.0, 0.3, 0.7)))
+    points += [(x + 20.0, y - 3.0), (x + 90.0, y - 4.0)]
+    lift = 60.0 - min(y for _, y in points)
+    return [(round(x, 6), round(y + lift, 6)) for x, y in points], (low, x), x + 30.0
+
+
+@settings(
+    deadline=None, max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(case=faces(), share=st.floats(0.0, 0.95))
+def test_a_mass_is_the_rock_that_the_ground_loses(case, share, tmp_path):
+    points, (low, high), road = case
+    upper = [y for x, y in points if x == low]  # the face begins at the last of these corners
+    top = upper[-1] if upper else float(np.interp(low, *np.transpose(points)))
+    bottom = min(y for x, y in points if x == high)
+    dip = share * math.degrees(math.atan2(top - bottom, high - low))
+    site = with_masses(tmp_path, points, f"m:{low}-{high}:{dip:.3f}", road=(road, road + 7.0))
+    check_taken_out(site, points)
+    corners = np.array(site.sources[0].polygon)
+    assert corners[:, 0].min() == low and corners[:, 0].max() == high
+    assert corners[:, 1].max() == pytest.approx(top) and corners[:, 1].min() == bottom
+
+
+@pytest.mark.parametrize("dip", [-5, 0, 10])
+@pytest.mark.parametrize(("rise", "words"), [(0.0, "35 m at the lower"), (1.5, "36.5 m at the")])
+def test_a_mass_on_ground_that_does_not_fall_is_refused(rise, words, dip, tmp_path):
+    points = (*STEP[:2], (15.0, 35.0), (20.0, 35.0 + rise), *STEP[4:])
+    with pytest.raises(BadInput, match="name a stretch on which the ground falls") as caught:
+        with_masses(tmp_path, points, f"m:15-20:{dip}")
+    assert "it is at 35 m at the upper end" in caught.value.hint and words in caught.value.hint
+    assert "dips" not in caught.value.hint
+
+
+def test_the_greatest_dip_that_an_error_permits_is_accepted(tmp_path):
+    points = ((0.0, 50.0), (10.0, 48.0), (50.0, 47.5), (70.0, 40.0), (160.0, 38.0))
+    with pytest.raises(BadInput, match=r"0 to less than the 0\.716 deg of the face"):
+        with_masses(tmp_path, points, "m:10-50:1", road=(80.0, 87.0))
+    check_taken_out(with_masses(tmp_path, points, "m:10-50:0.715", road=(80.0, 87.0)), points)

@@ -42,7 +42,7 @@ from rigdda.model.soundness import LEAST_BEYOND
 from rigdda.model.source import Source
 from rigdda.model.survey import Profile, profile_of, read_survey
 from rigdda.model.traffic import Traffic
-from rigdda.rounding import chainage
+from rigdda.rounding import chainage, rounded
 
 Floats = NDArray[np.float64]
 Span = tuple[float, float]
@@ -92,6 +92,10 @@ BLOCK = 0.8
 
 BLOCK_GAP = 0.01
 """Height of this block above the ground [m], so that rounding does not move it into the ground."""
+
+CORNER_DIGITS = 9
+"""Decimals of the corners of a mass between points of the survey [m]. With fewer, a corner on a
+straight face could make the mass concave."""
 
 PROFILE_SPEED = 3.0
 """Mean speed along the whole profile for which the simulated time is enough [m/s]."""
@@ -378,47 +382,48 @@ class _Draft:
 
     def _mass(self, text: str) -> Mass:
         """Return the mass that an option names."""
-        found, hint = (
-            MASS_OPTION.fullmatch(text.strip()),
-            'give NAME:START-END:DIP, such as "pillar:8-15:40"',
-        )
-        try:
-            name, span = _ranged("--mass", found[1], self.profile.origin) if found else ("", None)
-            dip = float(found[2]) if found else 0.0
-        except ValueError:
-            span = None
-        if span is None:
-            raise BadInput("--mass", text, hint)
-        low, high = span
+        origin = self.profile.origin
+        name, (low, high), dip = _mass_option(text, origin)
         if not self.x[0] <= low < high < self.road[0]:
-            ends = sorted(map(self.profile.origin.chainage_of, (float(self.x[0]), self.road[0])))
+            ends = sorted(map(origin.chainage_of, (float(self.x[0]), self.road[0])))
             hint = f"put it uphill of the road, between chainage {ends[0]:.10g} and {ends[1]:.10g}"
             raise BadInput("--mass", text, hint)
         if self.overhangs:
             raise BadInput("--mass", text, "the profile overhangs: give the polygon in the file")
-        inside = (self.x > low) & (self.x < high)
-        top, bottom = (round(float(np.interp(at, self.x, self.y)), 3) for at in span)
-        face = [[low, top], *_pairs(self.profile.points[inside]), [high, bottom]]
-        foot = round(bottom + (high - low) * float(np.tan(np.radians(dip))), 3)
-        if not 0.0 <= dip < 90.0 or not foot < top:
-            fall = np.degrees(np.arctan2(top - bottom, high - low))
-            hint = f"give a plane that dips by 0 to less than the {fall:.0f} deg of the face"
+        points = _with_corners(self.profile.points, (low, high))
+        face = points[_crack(points, low)[1] : _lower_end(points, high) + 1]
+        top, bottom = float(face[0, 1]), float(face[-1, 1])
+        if not bottom < top:
+            above, below = top + origin.elevation, bottom + origin.elevation
+            hint = (
+                "name a stretch on which the ground falls: it is at "
+                f"{above:.6g} m at the upper end and at {below:.6g} m at the lower end"
+            )
             raise BadInput("--mass", text, hint)
-        polygon = [*face, [low, foot]]
+        rise = (high - low) * math.tan(math.radians(dip))
+        foot = max(round(bottom + rise, 3), bottom)
+        if not 0.0 <= dip < 90.0 or not foot < top:
+            fall = math.degrees(math.atan2(top - bottom, high - low))
+            most = rounded(fall, ".3g", "down")
+            hint = f"give a plane that dips by 0 to less than the {most} deg of the face"
+            raise BadInput("--mass", text, hint)
+        polygon = [*_pairs(face), [low, foot]]
         try:
             convex_polygon("--mass", polygon)
         except BadInput:
             hint = "its face is hollow: name a part of it, or give the polygon in the file"
             raise BadInput("--mass", text, hint) from None
-        return Mass(name, span, foot, polygon)
+        return Mass(name, (low, high), foot, polygon)
 
     def _bedrock(self) -> Floats:
         """Return the ground without the jointed masses, (n, 2)."""
-        points = self.profile.points
-        for mass in self.masses:
-            x, (low, high) = points[:, 0], mass.span
-            under = [mass.polygon[0], [low, mass.foot], mass.polygon[-2]]
-            points = np.vstack([points[x < low], under, points[x > high]])
+        masses = sorted(self.masses, key=lambda mass: mass.span)
+        points = _with_corners(self.profile.points, [at for mass in masses for at in mass.span])
+        for mass in masses:  # downhill, so that the ground at the lower end is still as surveyed
+            low, high = mass.span
+            above, below = points[: _crack(points, low)[0] + 1], points[_lower_end(points, high) :]
+            crack = [] if above[-1, 1] == mass.foot else [[low, mass.foot]]
+            points = np.array([*above.tolist(), *crack, *below.tolist()])
         return points
 
     def _surveyed(self) -> str:
@@ -674,6 +679,47 @@ JOINTED = (
     "    { dip_deg = -50.0, spacing = 1.1, scatter = 0.2 },",
     "]",
 )
+
+
+def _mass_option(text: str, origin: Origin) -> tuple[str, Span, float]:
+    """Return the name, the stretch in chainages of the site and the dip [deg] in an option."""
+    found, span = MASS_OPTION.fullmatch(text.strip()), None
+    if found is not None:
+        try:
+            name, span = _ranged("--mass", found[1], origin)
+            dip = float(found[2])
+        except ValueError:
+            span = None
+    if span is None:
+        hint = 'give NAME:START-END:DIP, such as "pillar:8-15:40"'
+        raise BadInput("--mass", text, hint)
+    return name, span, dip
+
+
+def _with_corners(points: Floats, chainages: Iterable[float]) -> Floats:
+    """Return the corners of ground without overhangs, with a corner at each of some chainages."""
+    for at in chainages:
+        x, y = points.T
+        if not (x == at).any():
+            corner = at, round(float(np.interp(at, x, y)), CORNER_DIGITS)
+            points = np.insert(points, np.searchsorted(x, at), corner, axis=0)
+    return points
+
+
+def _crack(points: Floats, low: float) -> tuple[int, int]:
+    """Return the indices of the corners at which a crack meets the ground.
+
+    The ground above the crack ends at the first one, and the face of the mass begins at the last
+    one; they differ at a vertical face.
+    """
+    (at,) = np.nonzero(points[:, 0] == low)
+    return int(at[0]), int(at[-1])
+
+
+def _lower_end(points: Floats, high: float) -> int:
+    """Return the index of the corner at which a mass ends, at the foot of a vertical face."""
+    (at,) = np.nonzero(points[:, 0] == high)
+    return int(at[points[at, 1].argmin()])
 
 
 def _reach() -> float:

@@ -6,9 +6,11 @@ import math
 import os
 import time
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigdda import Event, Site, Source, seeds
 from rigdda.app import value_origins
@@ -16,6 +18,7 @@ from rigdda.app.reports.tables import empty_table
 from rigdda.app.reports.wording import surveyed
 from rigdda.barriers.fence import FENCE_CLASSES, Fence
 from rigdda.geometry import polygon_properties
+from rigdda.model import loose_blocks
 from rigdda.model.forest import most_energy
 from rigdda.model.joints import spaced_area
 from rigdda.releases import Batch
@@ -27,6 +30,9 @@ if TYPE_CHECKING:
 
 CUTS = 20
 """Number of times that a jointed mass is cut to describe its blocks."""
+
+OUTLINES = 10_000
+"""Number of outlines that are drawn to describe measured blocks."""
 
 TIMED_RELEASES = 3
 """Releases of each event that are timed."""
@@ -176,7 +182,7 @@ def _source(source: Source) -> str:
     if source.band is not None:
         return (
             f"source {source.name}: loose blocks at x = {chainage(source.band[0])} to "
-            f"{chainage(source.band[1])} m"
+            f"{chainage(source.band[1])} m{_measured(source)}"
         )
     areas = [_areas(source, seed) for seed in range(CUTS if source.polygon else 1)]
     counts, every = [len(found) for found in areas], np.concatenate(areas)
@@ -201,6 +207,47 @@ def _source(source: Source) -> str:
         f"90 % of them are below {low}, {middle} and {high} m2 ({light}, {usual} and {heavy} t), "
         f"and the largest has {most} m2 ({top} t)"
     )
+
+
+def _measured(source: Source) -> str:
+    """Return the volumes of the blocks of a band with edges, in words; nothing without edges."""
+    if source.edges is None:
+        return ""
+    volumes = measured_areas(source) ** 1.5
+    long, middle, short = sorted(source.edges, reverse=True)
+    return (
+        f", with edges of {long:g}, {middle:g} and {short:g} m; their volumes are "
+        f"{range_of((volumes.min(), volumes.max()))} m3, {_figures(volumes.mean())} m3 on average, "
+        "because outlines do not fill the box"
+    )
+
+
+def measured_areas(source: Source) -> NDArray[np.float64]:
+    """Return the areas of a fixed sample of blocks of a band with edges, (3, OUTLINES) [m2].
+
+    A row has the blocks on one face of the box. Releases draw the three faces equally often, and
+    the outline on a face as here.
+    """
+    assert source.edges is not None
+    first, second, third = source.edges
+    faces = np.array([second * third, third * first, first * second])
+    return np.multiply.outer(faces, _filled(source.corners))
+
+
+@lru_cache(maxsize=64)
+def _filled(corners: tuple[int, int]) -> NDArray[np.float64]:
+    """Return the shares of a face that outlines with random numbers of corners fill, (OUTLINES,).
+
+    The share does not depend on the edges of the box, so that the outlines are those in a cube with
+    edges of 1 m.
+    """
+    least, most = corners
+    numbers = seeds.generator(0, 0).random((OUTLINES, loose_blocks.RANDOM_NUMBERS + most))
+    law = loose_blocks.ShapeLaw(least, most, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, True)
+    outlines, count = np.empty((OUTLINES, most, 2)), np.empty(OUTLINES, dtype=np.int64)
+    areas = np.empty(OUTLINES)
+    loose_blocks.write_shapes_directly.call(numbers, law, outlines, count, areas)
+    return areas
 
 
 def _areas(source: Source, seed: int) -> list[float]:
@@ -268,17 +315,31 @@ def table(site: Site, trials: Sequence[Trial]) -> Table:
     return found
 
 
-def blocks_of(event: Event, source: Source) -> tuple[str, tuple[float, float]]:
-    """Return the number of blocks of an event, and the least and greatest area of one [m2]."""
+def blocks_of(event: Event, source: Source) -> tuple[str, Range]:
+    """Return the number of blocks of an event, and the least and greatest area of one [m2].
+
+    The areas of measured blocks are those of a sample, see `measured_areas`.
+    """
     low, high = event.number
     number = f"{low}" if low == high else f"{low} to {high}"
     if source.edges is not None:
-        long, middle, short = sorted(source.edges, reverse=True)
-        return number, (middle * short, long * middle)
+        areas = measured_areas(source)
+        return number, (float(areas.min()), float(areas.max()))
     if event.area is not None:
         return number, event.area
-    areas = _areas(source, 0)
-    return f"{len(areas)}", (min(areas), max(areas))
+    cut = _areas(source, 0)
+    return f"{len(cut)}", (min(cut), max(cut))
+
+
+def longest_block(event: Event, source: Source) -> float:
+    """Return the length of the largest block of an event [m].
+
+    That of a measured block is its longest edge, which its outline fills.
+    """
+    if source.edges is not None:
+        return max(source.edges)
+    _, (_, most) = blocks_of(event, source)
+    return math.sqrt(most * (source.aspect[1] if source.band is not None else 1.0))
 
 
 def size_of_release(event: Event, source: Source) -> tuple[Range, Range]:

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from rigdda import Event, Site, Source
-from rigdda.app.site_check import Trial, blocks_of, joint_scale
+from rigdda.app.site_check import Trial, blocks_of, joint_scale, longest_block
 from rigdda.barriers.fence import FENCE_CLASSES
 from rigdda.envs.barrier_formulas import mean_scene
 from rigdda.fields import Described, described, parse
@@ -267,7 +267,7 @@ def _odd_zone(site: Site) -> Iterator[str]:
             f"way by {needed:g} m, and there are {room:.1f} m up to the road; begin the zone "
             "farther uphill"
         )
-    size = max(_size(site, event) for event in site.events)
+    size = max(longest_block(event, site.source(event.source)) for event in site.events)
     for name, factor in (("max_height", 1.5), ("max_depth", 1.0), ("max_width", 1.5)):
         value = getattr(zone, name)
         if value < factor * size:
@@ -462,13 +462,6 @@ def _odd_traffic(site: Site, written: Written) -> Iterator[str]:
             )
 
 
-def _size(site: Site, event: Event) -> float:
-    """Return the length of the largest block of an event [m]."""
-    source = site.source(event.source)
-    _, (_, most) = blocks_of(event, source)
-    return math.sqrt(most * (source.aspect[1] if source.band is not None else 1.0))
-
-
 def _odd_source(site: Site, source: Source) -> Iterator[str]:
     """Yield what is odd about a source."""
     if not LIGHT <= source.density <= USUAL_DENSITIES:
@@ -578,8 +571,8 @@ def _odd_event(site: Site, event: Event, table: Mapping[str, Any]) -> Iterator[s
 def _odd_volume(event: Event, source: Source, table: Mapping[str, Any]) -> Iterator[str]:
     """Yield what is odd about the size of the blocks of an event."""
     if source.edges is not None:
-        volume = math.prod(source.edges)
-        low, high, what = volume, volume, f"{source.words}.edges = {_numbers(source.edges)} m"
+        low, high = (area**1.5 for area in blocks_of(event, source)[1])
+        what = f"{source.words}.edges = {_numbers(source.edges)} m"
         unit = "are the edges in metres?"
     elif event.area is not None:
         low, high = (area**1.5 for area in event.area)

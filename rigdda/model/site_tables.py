@@ -28,6 +28,9 @@ from rigdda.model.source import Point, Source
 from rigdda.model.traffic import Traffic
 from rigdda.rounding import chainage
 
+SAME_POINT = 1e-9
+"""Distance below which two points of the ground are the same [m]; `Terrain` refuses such points."""
+
 
 @documented
 class Stretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -80,7 +83,7 @@ class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         last = -check.LARGEST_NUMBER
         for i, stretch in enumerate(self.surfaces):
             where = f"slope.surfaces[{i}]"
-            if stretch.start < last:
+            if stretch.start < last - SAME_POINT:
                 before = self.surfaces[i - 1].surface
                 hint = (
                     f"let {stretch.surface} begin at {chainage(last)} or beyond, where {before} "
@@ -102,18 +105,34 @@ class Slope(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def chain(self) -> tuple[tuple[Point, ...], tuple[str, ...]]:
         """Return the corners, including those of changes of surface, and the segments' surfaces.
 
-        A vertical face has the surface of the ground just beyond it.
+        A vertical face has the surface of the ground just beyond it. The end of a stretch less than
+        `SAME_POINT` from a corner or from the end of another stretch is moved there.
         """
-        cuts = {x for stretch in self.surfaces for x in (stretch.start, stretch.end)}
+        stretches = self._merged()
+        cuts = {x for start, end, _ in stretches for x in (start, end)}
         points, names = [self.points[0]], []
         for (ax, ay), (bx, by) in pairwise(self.points):
             inner = sorted((x for x in cuts if min(ax, bx) < x < max(ax, bx)), reverse=bx < ax)
             for x in inner:
                 points.append((x, ay + (by - ay) * (x - ax) / (bx - ax)))
             points.append((bx, by))
-            ends = [ax, *inner, bx]
-            names += [self.surface_at(0.5 * (a + b)) for a, b in pairwise(ends)]
+            for a, b in pairwise((ax, *inner, bx)):
+                found = (name for start, end, name in stretches if start <= 0.5 * (a + b) < end)
+                names.append(next(found, self.surface))
         return tuple(points), tuple(names)
+
+    def _merged(self) -> list[tuple[float, float, str]]:
+        """Return the ends and the surface of each stretch, with ends at the same point merged."""
+        known = [x for x, _ in self.points]
+
+        def merged(x: float) -> float:
+            near = min(known, key=lambda other: abs(other - x))
+            if abs(near - x) < SAME_POINT:
+                return near
+            known.append(x)
+            return x
+
+        return [(merged(part.start), merged(part.end), part.surface) for part in self.surfaces]
 
 
 MASS_WIDTH = 10.0
@@ -132,6 +151,9 @@ VOLUME_EXPONENT = 2.0 / 3.0
 """Power of a block's volume that is its area: a block is as long along the road as the root of its
 area, as its mass and the width of its release have it."""
 
+
+EXPONENT = 0.6
+"""Default of `Event.exponent` [-]."""
 
 _OPEN: Any = msgspec.UNSET
 """Default of `Event.rate`, which may be given as a return period."""
@@ -194,7 +216,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             ge=0.0,
             le=5.0,
         ),
-    ] = 0.6
+    ] = EXPONENT
     number: Annotated[
         tuple[Count, Count],
         about(
@@ -303,7 +325,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def _check_volumes(self) -> None:
         """Check that a distribution of volumes is complete and the only one."""
-        where, lognormal = self.words, (self.volume_median, self.volume_spread)
+        where = self.words
         if self.volumes is not None or self.volume_shares is not None:
             hint = "leave it out: the event gives volumes and volume_shares"
             for name in ("volume", "volume_median", "volume_spread"):
@@ -319,20 +341,34 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             ends = volumes[0] ** VOLUME_EXPONENT, volumes[-1] ** VOLUME_EXPONENT
             if self.area not in (None, ends):
                 raise BadInput(f"{where}.area", self.area, hint)
-        elif lognormal != (None, None):
+            self._check_no_exponent("the event gives volumes and volume_shares")
+        elif (self.volume_median, self.volume_spread) != (None, None):
+            self._check_lognormal()
+            self._check_no_exponent("the event gives volume_median and volume_spread")
+
+    def _check_lognormal(self) -> None:
+        """Check that lognormal volumes have a median within their limits and a spread."""
+        where = self.words
+        if self.volume_median is None or self.volume_spread is None:
             missing = "volume_spread" if self.volume_spread is None else "volume_median"
-            if None in lognormal:
-                hint = "give both volume_median and volume_spread"
-                raise BadInput(f"{where}.{missing}", None, hint)
-            limits = self.volume_limits
-            if limits is None:
-                hint = "give the least and the greatest volume, to which lognormal volumes are cut"
-                raise BadInput(f"{where}.volume", None, hint)
-            assert self.volume_median is not None
-            rounding = 1.0 + 1e-9  # the limits are stored as areas
-            if not limits[0] / rounding <= self.volume_median <= limits[1] * rounding:
-                hint = f"give a median within the limits, {limits[0]:.3g} to {limits[1]:.3g} m3"
-                raise BadInput(f"{where}.volume_median", self.volume_median, hint)
+            hint = "give both volume_median and volume_spread"
+            raise BadInput(f"{where}.{missing}", None, hint)
+        limits = self.volume_limits
+        if limits is None:
+            hint = "give the least and the greatest volume, to which lognormal volumes are cut"
+            raise BadInput(f"{where}.volume", None, hint)
+        rounding = 1.0 + 1e-9  # the limits are stored as areas
+        if not limits[0] / rounding <= self.volume_median <= limits[1] * rounding:
+            hint = f"give a median within the limits, {limits[0]:.3g} to {limits[1]:.3g} m3"
+            raise BadInput(f"{where}.volume_median", self.volume_median, hint)
+
+    def _check_no_exponent(self, reason: str) -> None:
+        """Check that the exponent of the power law is not given where another law holds.
+
+        The default counts as left out because `Site.save` writes it.
+        """
+        if self.exponent != EXPONENT:
+            raise BadInput(f"{self.words}.exponent", self.exponent, f"leave it out: {reason}")
 
     @property
     def volume_limits(self) -> tuple[float, float] | None:
@@ -402,8 +438,8 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Raises
         ------
         BadInput
-            If blocks of a band lack an area or a group lacks a width, or the area or number of
-            blocks is given although the source determines it.
+            If blocks of a band lack an area or a group lacks a width, or the area, the exponent or
+            the number of blocks is given although the source determines it.
         """
         if source.band is None:
             if self.area is not None or self.number != (1, 1):
@@ -413,10 +449,12 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                     "blocks"
                 )
                 raise BadInput(f"{self.words}.{what}", getattr(self, what), hint)
+            self._check_no_exponent(f"source {source.name} is not a band and defines its blocks")
         elif source.edges is not None:
             if self.area is not None:
                 hint = f"leave it (or volume) out: the edges of source {source.name} determine it"
                 raise BadInput(f"{self.words}.area", self.area, hint)
+            self._check_no_exponent(f"the edges of source {source.name} determine the volumes")
         elif self.area is None:
             hint = (
                 f"give the least and the greatest area of a block of band {source.name} [m2], or a "

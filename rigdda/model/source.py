@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, NamedTuple
+from functools import cache
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 import numpy as np
@@ -171,14 +172,14 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         where = self.words
+        left_out = [name for name in Shape._fields if self._is_left_out(name)]
         fields.check(self, f"{where}.")
         if self.shape is not None:
             if self.band is None or self.edges is not None:
                 hint = "leave it out: only blocks of a band without edges have a shape"
                 raise BadInput(f"{where}.shape", self.shape, hint)
-            for name in ("corners", "aspect"):
-                if getattr(self, name) == getattr(USUAL_SHAPE, name):
-                    msgspec.structs.force_setattr(self, name, getattr(SHAPES[self.shape], name))
+            for name in left_out:
+                msgspec.structs.force_setattr(self, name, getattr(SHAPES[self.shape], name))
             msgspec.structs.force_setattr(self, "shape", None)
         if self.edges is not None:
             if self.band is None:
@@ -200,6 +201,34 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             self._check_blocks()
         else:
             self._check_mass()
+        self._check_unused()
+
+    def _is_left_out(self, name: str) -> bool:
+        """Return whether a range of the outline was not given.
+
+        It is then the default itself. A range that is given is another object, even if it is equal.
+        """
+        return getattr(self, name) is getattr(USUAL_SHAPE, name)
+
+    def _check_unused(self) -> None:
+        """Check that no key is given that blocks of this kind do not use.
+
+        A key with its default counts as left out because `Site.save` writes the keys of all kinds.
+        """
+        unused: dict[str, str] = {}
+        if self.band is None:
+            reason = "only blocks of a band have it"
+            start = "surveyed blocks have a `disturbance`" if self.blocks else "a mass is at rest"
+            unused |= dict.fromkeys(("corners", "aspect"), reason)
+            unused |= dict.fromkeys(("spin", "speed"), f"{reason}; {start}")
+        elif self.edges is not None:
+            unused["aspect"] = "the edges of the blocks determine it"
+        if not self.blocks:
+            unused["disturbance"] = "only surveyed blocks have it"
+        for name, reason in unused.items():
+            value = getattr(self, name)
+            if value != _default(name):
+                raise BadInput(f"{self.words}.{name}", value, f"leave it out: {reason}")
 
     def _check_mass(self) -> None:
         convex_polygon(f"{self.words}.polygon", self.polygon)
@@ -287,3 +316,9 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return [
             (v * math.cos(a), v * math.sin(a), 0.0) for v, a in zip(speeds, angles, strict=True)
         ]
+
+
+@cache
+def _default(name: str) -> Any:
+    """Return the default of a field of a source."""
+    return next(f.default for f in msgspec.structs.fields(Source) if f.name == name)

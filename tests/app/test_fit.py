@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import csv
+from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from processes import png_size
 
 from rigdda import BadInput, Site
 from rigdda.app.cli import main
+from rigdda.app.reports import pictures
 from rigdda.app.uncertainty import fit
 from rigdda.app.uncertainty.fit import check_parameters, run_outs, scores
 from rigdda.app.uncertainty.observations import OBSERVED_RUN_OUT, DataSet, read
-from rigdda.app.uncertainty.parameters import Parameter, parse, with_values
+from rigdda.app.uncertainty.parameters import Parameter, Posterior, parse, with_values
 from rigdda.model.site_tables import Rebound
 
 SITE = Site.load("verge")
@@ -201,3 +205,61 @@ def test_one_number_is_searched_whatever_its_scores() -> None:
 
         fit.explore(score, 1, 60, seed)
         assert count[0] > 40
+
+
+def picture(
+    observed: np.ndarray, computed: np.ndarray, event: str, path: Path, monkeypatch
+) -> Figure:
+    """Return the picture of a fit to run-outs of an event, which `draw` also writes to a file."""
+    drawn: list[Figure] = []
+    save = pictures.save
+
+    def keep(figure: Figure, where: Path) -> None:
+        drawn.append(figure)
+        save(figure, where)
+
+    monkeypatch.setattr(pictures, "save", keep)
+    parameters, values = (parse("surfaces.soil.rolling"),), np.array([0.3])
+    quality = fit.seen({event: observed}, SITE.slope.toe)
+    posterior = Posterior.of(("surfaces.soil.rolling",), values[:, None], np.ones(1))
+    best = fit.Candidate(values, {event: computed})
+    left, sets = np.zeros(len(observed)), {event: DataSet(OBSERVED_RUN_OUT, event, observed)}
+    found = fit.Fit(SITE, parameters, best, values, values, quality, quality, left, posterior,
+                    {event: observed}, sets)  # fmt: skip
+    fit.draw(path, found)
+    return drawn[0]
+
+
+@pytest.mark.parametrize("name", ["block $\\frac$", "from $5 to $6", "a_b^c"])
+def test_the_picture_of_a_fit_takes_any_name(name, tmp_path, monkeypatch):
+    runs = np.array([9.8, 12.3, 14.1])
+    figure = picture(runs, runs + 1.0, name, tmp_path / "fit.png", monkeypatch)
+    assert figure.axes[0].get_title() == f"{name}\n3 observed"
+    assert min(png_size(tmp_path / "fit.png")) > 100
+
+
+@pytest.mark.parametrize(
+    ("observed", "computed"),
+    [
+        ((-30.0, -25.0, -20.0), (-27.0, -24.0)),
+        ((-30.0, -25.0, -20.0), (-50.0, 4.0)),
+        ((480_010.0, 480_020.0, 480_030.0), (480_012.0, 480_040.0)),
+        ((0.0, 0.0, 0.0), (0.0, 0.0)),
+        ((-5.0, -5.0, -5.0), (-5.0, -5.0)),
+    ],
+)
+def test_the_axis_of_the_picture_reaches_a_little_beyond_all_values(
+    observed, computed, tmp_path, monkeypatch
+):
+    figure = picture(np.array(observed), np.array(computed), "block", tmp_path / "fit.png",
+                     monkeypatch)  # fmt: skip
+    axes = figure.axes[0]
+    values = [*observed, *computed]
+    low, high = axes.get_xlim()
+    assert low < min(values) and high > max(values)
+    reach = max(values) - min(values)
+    if reach > 0.0:
+        assert (high - low) == pytest.approx(1.1 * reach)
+    x, share = (np.asarray(data) for data in axes.lines[0].get_data())
+    assert (x[0], x[-1]) == pytest.approx((low, high))
+    assert (share[0], share[-1]) == (0.0, 1.0)  # the whole computed distribution is drawn

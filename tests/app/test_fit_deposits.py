@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import random
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pytest
 from processes import refused, rig, rows, run
@@ -211,6 +213,137 @@ def test_the_same_observations_in_two_files_are_refused(tmp_path: Path) -> None:
     line = refused("fit", "quick", "seen.csv", "seen.csv", "--parameters",
                    "surfaces.rock.rolling", folder=tmp_path)  # fmt: skip
     assert "in one file only" in line
+
+
+def test_stations_that_tables_cannot_tell_apart_are_refused(tmp_path: Path) -> None:
+    """In one file and in two; the reason is not that a file repeats the other."""
+    head = "event,station_m,quantity,value\n"
+    near = ["block,30.00001,velocity,9\n", 2 * "block,30.00002,velocity,8\n"]
+    words = r"station_m = 30\.00002: give 30\.00001 for both, or .*: in tables, both .* 30 m$"
+    (tmp_path / "a.csv").write_text(head + "".join(near))
+    with pytest.raises(BadInput, match=r"observed .*a\.csv " + words):
+        read([tmp_path / "a.csv"], SITE)
+    for name, lines in zip("bc", near, strict=True):
+        (tmp_path / f"{name}.csv").write_text(head + lines)
+    with pytest.raises(BadInput, match=r"observed .*c\.csv " + words):
+        read([tmp_path / "b.csv", tmp_path / "c.csv"], SITE)
+    apart = near[1].replace("30.00002", "30.001")
+    (tmp_path / "c.csv").write_text(head + apart)
+    names = ["block, velocity at 30 m", "block, velocity at 30.001 m"]
+    assert list(read([tmp_path / "b.csv", tmp_path / "c.csv"], SITE)) == names
+
+
+def test_an_event_with_the_name_of_other_observations_is_refused(tmp_path: Path) -> None:
+    events = (*SITE.events[:1], msgspec.structs.replace(SITE.events[0], name="block, deposit"))
+    site = msgspec.structs.replace(SITE, events=events, meshes=())
+    (tmp_path / "a.csv").write_text("event,start_m,end_m,share\nblock,20,30,1\nblock,30,40,2\n")
+    (tmp_path / "b.csv").write_text("event,run_out_m\n" + 3 * '"block, deposit",30\n')
+    with pytest.raises(BadInput, match=r"b\.csv event = 'block, deposit': rename this event"):
+        read([tmp_path / "a.csv", tmp_path / "b.csv"], site)
+
+
+@pytest.mark.parametrize("text, count", [("10", 10), ("1e1", 10), ("10.0", 10), (" 7", 7)])
+def test_numbers_of_releases_are_read_as_other_numbers(
+    text: str, count: int, tmp_path: Path
+) -> None:
+    rows = f"block,20,30,1,{text}\nblock,30,40,2,{count}\n"
+    (tmp_path / "a.csv").write_text("event,start_m,end_m,share,releases\n" + rows)
+    (one,) = read([tmp_path / "a.csv"], SITE).values()
+    assert one.releases == count and isinstance(one.releases, int)
+
+
+@pytest.mark.parametrize("text", [5000 * "1", "1000001", "1e300", "2.5", "0", "-3", "", "\u0663"])
+def test_an_unsound_number_of_releases_is_named(text: str, tmp_path: Path) -> None:
+    rows = f"block,20,30,1,{text}\nblock,30,40,2,{text}\n"
+    (tmp_path / "a.csv").write_text("event,start_m,end_m,share,releases\n" + rows, "utf-8")
+    words = r"a\.csv row 1 releases = .*: give a whole number of at least 1 and at most 1000000$"
+    with pytest.raises(BadInput, match=words):
+        read([tmp_path / "a.csv"], SITE)
+
+
+ROLLING = ("--parameters", "surfaces.rock.rolling")
+DEPOSIT_COLUMNS = "event,start_m,end_m,share,releases\n"
+
+
+@pytest.mark.parametrize(
+    "text, options, named",
+    [
+        (
+            "event,run_out_m\n" + 3 * "block,30\n",
+            ("--parameters", "surfaces.rock.friction_deg=-5:20"),
+            "surfaces.rock.friction_deg = -5",
+        ),
+        (
+            "event,run_out_m\n" + 3 * "block,30\n",
+            ("--parameters", "surfaces.clay.rolling"),
+            "name a number of the site file",
+        ),
+        (
+            "event,run_out_m\n" + 3 * "block,30\n",
+            ("--parameters", "prices.concrete=1:2"),
+            "do not depend on it",
+        ),
+        (
+            "event,station_m,quantity,value\n" + 3 * "block,20,height,1\n",
+            ("--model", "lumped", "--parameters", "lumped.rock.normal"),
+            "use blocks: points give run-outs only",
+        ),
+        (
+            DEPOSIT_COLUMNS + "block,0,30,1,1\nblock,30,33,1,1\nblock,33,60,1,1\n",
+            ROLLING,
+            "give a deposit of more releases",
+        ),
+        (
+            DEPOSIT_COLUMNS + "block,-9,-8,1,1\nblock,-8,-7,1,1\n",
+            ROLLING,
+            "-9 to -7 m': no rock of 10 computed releases stops there",
+        ),
+    ],
+)
+def test_a_refused_fit_leaves_no_folder(
+    text: str, options: tuple[str, ...], named: str, tmp_path: Path
+) -> None:
+    (tmp_path / "seen.csv").write_text(text)
+    line = refused("fit", "quick", "seen.csv", *options, "--releases", 10, "--out", "out",
+                   folder=tmp_path)  # fmt: skip
+    assert named in line
+    assert not (tmp_path / "out").exists()
+
+
+def stopped(*each: Sequence[float]) -> Callable[..., SimpleNamespace]:
+    """Return a function in place of `passages`: blocks of 1 t stop at given chainages [m]."""
+    stops = np.zeros(sum(map(len, each)), dtype=[("release", int), ("x", float), ("mass", float)])
+    stops["release"] = np.repeat(np.arange(len(each)), [len(own) for own in each])
+    stops["x"] = [x for own in each for x in own]
+    stops["mass"] = 1000.0
+    return lambda *_: SimpleNamespace(stops=stops, seed=range(len(each)))
+
+
+@pytest.mark.parametrize(
+    "each, value, mend",
+    [
+        (((5.0,), (70.0,)), "10 to 40 m", "correct the event or the chainages, or change the gro"),
+        (((22.0,), (24.0, 70.0)), "20 to 40 m", "divide it, or change the ground .*LOW:HIGH"),
+        (((12.0, 20.0), (13.0, 22.0)), "block, deposit", "alike.*let releases differ"),
+    ],
+)
+def test_a_deposit_that_the_computed_releases_cannot_judge(
+    each: tuple[tuple[float, ...], ...], value: str, mend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More releases of the deposit would not help, which was the advice for fewer than three."""
+    ends = np.array([10.0, 20.0, 40.0]) if value != "block, deposit" else np.array([10.0, 15, 40])
+    one = DataSet(DEPOSIT, "block", ends, np.nan, np.array([0.5, 0.5]), 9)
+    monkeypatch.setattr(fit, "passages", stopped(*each))
+    with pytest.raises(BadInput, match=f"of block = '{value}'.*{mend}") as bad:
+        fit.independent_blocks(SITE, one, range(len(each)))
+    assert "more releases" not in str(bad.value)
+
+
+def test_a_single_block_a_release_counts_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The variance between releases of one block each is that of independent blocks."""
+    one = DataSet(DEPOSIT, "block", np.array([10.0, 20, 40]), np.nan, np.array([0.5, 0.5]), 9)
+    monkeypatch.setattr(fit, "passages", stopped((12.0,), (25.0,), (13.0,), (39.0,)))
+    assert fit.independent_blocks(SITE, one, range(4)) == 9
 
 
 @pytest.mark.slow

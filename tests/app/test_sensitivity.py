@@ -6,6 +6,7 @@ import random
 import time
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from processes import png_size, refused, rig, rows, run
@@ -17,17 +18,20 @@ from rigdda.app.uncertainty.parameters import (
     Posterior,
     choose,
     ground,
+    inputs,
     plausible,
     read_posterior,
     set_numbers,
+    unvaried,
 )
 from rigdda.app.uncertainty.sensitivity import Response, analyse, of_function, places, plan
 from rigdda.app.uncertainty.sensitivity import run as analyse_site
 from rigdda.envs.cost import judge
 from rigdda.files import UNFINISHED
+from rigdda.geometry import polygon_properties
 from rigdda.ground.grounds import GROUNDS
 from rigdda.model import site_names
-from rigdda.model.site_tables import MOST_OFTEN
+from rigdda.model.site_tables import MOST_OFTEN, Event
 
 ISHIGAMI = [Parameter(name, -np.pi, np.pi) for name in "abc"]
 ISHIGAMI_S1, ISHIGAMI_ST = (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437)  # a = 7, b = 0.1
@@ -182,6 +186,122 @@ def test_sizes_are_factors_on_volumes() -> None:
     dearer = set_numbers(quick, ("prices.level",), (2.0,))
     fence = (Fence(25.0, 2.0, energy_class=250),)
     assert dearer.capital(fence) == pytest.approx(2.0 * quick.capital(fence))
+
+
+VOLUMES = {
+    "power law": {"volume": (0.1, 10.0)},
+    "lognormal": {"volume": (0.01, 100.0), "volume_median": 1.0, "volume_spread": 0.5},
+    "surveyed": {"volumes": (0.1, 1.0, 10.0), "volume_shares": (0.0, 0.5, 1.0)},
+}
+"""Distributions of the volumes of an event."""
+
+
+def with_volumes(**volumes: object) -> Site:
+    """Return the site `quick` with other volumes of the single blocks."""
+    quick = Site.load("quick")
+    block = quick.events[0]
+    own = Event(name="block", rate=block.rate, source=block.source, design=True, **volumes)
+    return msgspec.structs.replace(quick, events=(own, *quick.events[1:]))
+
+
+def volumes_of(site: Site, event: str = "block") -> np.ndarray:
+    """Return the volumes of the blocks of 60 releases of an event [m3]."""
+    drawn = (site.draw(seed, event).blocks for seed in range(60))
+    areas = [polygon_properties(block.vertices)[0] for blocks in drawn for block in blocks]
+    return np.array(areas) ** 1.5
+
+
+@pytest.mark.parametrize("law", VOLUMES)
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_size_multiplies_the_volume_of_every_block(law: str, factor: float) -> None:
+    site = with_volumes(**VOLUMES[law])
+    (size,) = (one for one in choose(("sizes",), site, ()) if one.path == "events.block.size")
+    assert (size.low, size.high) == (0.5, 2.0)
+    scaled = set_numbers(site, size.paths, (factor,))
+    assert volumes_of(scaled) == pytest.approx(factor * volumes_of(site), rel=1e-9)
+    limits = np.array(site.event("block").volume_limits)
+    assert scaled.event("block").volume_limits == pytest.approx(factor * limits)
+    assert set_numbers(site, size.paths, (1.0,)) == site
+
+
+def test_the_median_and_surveyed_volumes_have_the_factor_of_the_size() -> None:
+    lognormal = set_numbers(with_volumes(**VOLUMES["lognormal"]), ("events.block.size",), (2.0,))
+    assert lognormal.event("block").volume_median == 2.0
+    assert lognormal.event("block").volume_spread == 0.5
+    surveyed = set_numbers(with_volumes(**VOLUMES["surveyed"]), ("events.block.size",), (2.0,))
+    assert surveyed.event("block").volumes == (0.2, 2.0, 20.0)
+    assert surveyed.event("block").volume_shares == (0.0, 0.5, 1.0)
+
+
+def measured() -> Site:
+    """Return the site `quick` with measured blocks in its band."""
+    quick = Site.load("quick")
+    face = msgspec.structs.replace(quick.source("face"), edges=(1.2, 1.0, 0.8))
+    events = tuple(
+        msgspec.structs.replace(one, area=None) if one.source == "face" else one
+        for one in quick.events
+    )
+    return msgspec.structs.replace(quick, sources=(face, *quick.sources[1:]), events=events)
+
+
+def test_the_size_of_measured_blocks_is_that_of_their_source() -> None:
+    site = measured()
+    names = [one.path for one in choose(("sizes",), site, ())]
+    assert names == ["sources.face.size", "sources.mass.size"]
+    assert unvaried((), site, ()) == []
+    scaled = set_numbers(site, ("sources.face.size",), (2.0,))
+    assert volumes_of(scaled) == pytest.approx(2.0 * volumes_of(site), rel=1e-9)
+    with pytest.raises(BadInput, match=r"name sources\.face\.size"):
+        set_numbers(site, ("events.block.size",), (2.0,))
+
+
+def test_factors_multiply_the_numbers_in_whatever_order_they_are_named() -> None:
+    site = with_volumes(**VOLUMES["lognormal"])
+    paths, values = ("events.block.size", "events.block.volume_median"), (2.0, 0.7)
+    for order in (slice(None), slice(None, None, -1)):
+        found = set_numbers(site, paths[order], values[order])
+        assert found.event("block").volume_median == pytest.approx(1.4)
+    paths, values = ("prices.level", "prices.concrete"), (2.0, 100.0)
+    for order in (slice(None), slice(None, None, -1)):
+        assert set_numbers(site, paths[order], values[order]).prices.concrete == 200.0
+
+
+def test_numbers_that_cannot_be_varied_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+    """Surveyed corners, and volumes that fill the range of what a site file accepts."""
+    toppling = Site.load("toppling")
+    paths = [one.path for one in inputs((), toppling, ())]
+    assert paths and not [path for path in paths if path.endswith(".size")]
+    told = "the volumes of the blocks of source 'mass', whose corners are surveyed"
+    assert capsys.readouterr().out == f"note: not varied: {told}\n"
+    inputs(("ground", "rates"), toppling, ())
+    assert capsys.readouterr().out == ""
+    shares = (0.0, 1.0)
+    wide = with_volumes(volumes=(1e-6, 800.0), volume_shares=shares)
+    size = choose(("sizes",), wide, ())[0]
+    assert size.low == pytest.approx(1.0) and 1.0 < size.high < 2.0
+    wide = with_volumes(volumes=(1e-6, size.high * 800.0), volume_shares=shares)
+    assert "events.block.size" not in {one.path for one in choose(("sizes",), wide, ())}
+    inputs(("sizes",), wide, ())
+    told = "events.block.size, of which the site permits no other value"
+    assert capsys.readouterr().out == f"note: not varied: {told}\n"
+
+
+@pytest.mark.parametrize(
+    "name, named",
+    [
+        ("sizes", "sizes': name other numbers or groups: .* of source 'mass', whose corners"),
+        ("events.mass.size=0.5:2", "leave it out: the blocks of source mass are surveyed"),
+        ("sources.mass.size=0.5:2", "leave it out: the blocks of this source are surveyed"),
+    ],
+)
+def test_surveyed_blocks_have_no_size(name: str, named: str) -> None:
+    with pytest.raises(BadInput, match=named):
+        inputs((name,), Site.load("toppling"), ())
+
+
+def test_the_size_of_loose_blocks_is_that_of_their_events() -> None:
+    with pytest.raises(BadInput, match=r"name events\.block\.size or events\.group\.size: events"):
+        set_numbers(Site.load("quick"), ("sources.face.size",), (2.0,))
 
 
 def test_a_posterior_is_one_input(tmp_path: Path) -> None:

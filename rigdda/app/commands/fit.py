@@ -69,10 +69,13 @@ def fit(
 
     where = rigdda.Site.load(site)
     seen, parameters = observations.read(observed, where), [parse(name) for name in names]
+    values = job.values_to_fit(where, seen, parameters, releases, seed, model)
     files = ("site.toml", "fit.csv", "fit.png", "posterior.csv")
     folder = folder_for(out, f"fit-{where.name}", *files)
     with recorded_run(folder, where), progress(budget) as tick:
-        found = job.fit(where, seen, parameters, budget, releases, seed, tick, model, folder)
+        found = job.fit(
+            where, seen, parameters, budget, releases, seed, tick, model, folder, values
+        )
         fitted = {one.path for one in parameters}
         marked = [mark for mark in value_origins.marks_of(site) if mark.path not in fitted]
         value_origins.save(found.site, folder / "site.toml", marked)

@@ -19,7 +19,7 @@ import math
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import cma
 import msgspec
@@ -44,6 +44,10 @@ from rigdda.envs.outcome_cache import fingerprint
 from rigdda.files import UNFINISHED, atomic
 from rigdda.lumped_mass import lumped
 from rigdda.passages import Passages, passages
+from rigdda.rounding import chainage
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FITTED_TABLES = {"blocks": ("surfaces", "motion", "scatter"), "lumped": ("lumped", "scatter")}
 """Tables of a site file that affect the run-outs of a model."""
@@ -63,6 +67,18 @@ def check_parameters(parameters: Sequence[Parameter], model: str) -> None:
             known = ", ".join(f"{name}.*" for name in FITTED_TABLES[model])
             hint = f"run-outs of the model {model} do not depend on it: choose from {known}"
             raise BadInput("--parameters", parameter.path, hint)
+
+
+def check_quantities(sets: DataSets, model: str) -> None:
+    """Check that a model computes the observed quantities.
+
+    Raises
+    ------
+    BadInput
+        If the model is "lumped" and there are other observations than run-outs.
+    """
+    if model == "lumped" and any(one.quantity != OBSERVED_RUN_OUT for one in sets.values()):
+        raise BadInput("--model", model, "use blocks: points give run-outs only")
 
 
 Floats = NDArray[np.float64]
@@ -90,13 +106,12 @@ def computed(site: Site, sets: DataSets, model: Model, seeds: range) -> dict[str
     Diverged
         If a simulation diverges.
     """
+    check_quantities(sets, model)
     runs = [one.event for one in sets.values() if one.quantity == OBSERVED_RUN_OUT]
     out = run_outs(site, model, runs, seeds)
     others = [one for one in sets.values() if one.quantity != OBSERVED_RUN_OUT]
     if not others:
         return out
-    if model == "lumped":
-        raise BadInput("--model", model, "use blocks: points give run-outs only")
     stations = sorted({one.station for one in others if one.passes})
     events = list(dict.fromkeys(one.event for one in others))
     asked = [(seed, event) for event in events for seed in seeds]
@@ -129,6 +144,11 @@ def _values(site: Site, found: Passages, one: DataSet) -> Floats:
     return np.asarray(here["x"][np.searchsorted(share, place)], dtype=np.float64)
 
 
+ALIKE = 1e-20
+"""Variance between releases of the share of rock above the ends of intervals that is due to
+rounding [-]; releases with a smaller one are alike."""
+
+
 def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
     """Return the number of independent blocks with as much information as a deposit.
 
@@ -140,7 +160,9 @@ def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
     Raises
     ------
     BadInput
-        If there are fewer than three.
+        If there are fewer than three; or if the number does not follow from the computed releases,
+        because no rock stops within the deposit, all of it stops in one interval, or the releases
+        are alike.
     Diverged
         If a simulation diverges.
     """
@@ -153,12 +175,16 @@ def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
     for j, end in enumerate(one.values[1:-1]):
         below = stops[stops["x"] <= end]
         np.add.at(above[:, j], below["release"], below["mass"])
-    share = above.sum(axis=0) / max(float(mass.sum()), 1e-12)
+    _check_stops(one, stops["x"], len(mass))
+    share = above.sum(axis=0) / float(mass.sum())
     alone = float((share * (1.0 - share)).sum())
-    each = (above - share * mass[:, None]) / max(float(mass.mean()), 1e-12)
+    each = (above - share * mass[:, None]) / float(mass.mean())
     between = float(np.square(each).mean(axis=0).sum())
-    per_release = alone / between if between > 0.0 else 0.0
-    count = round(per_release * one.releases)
+    if between < ALIKE:
+        hint = f"{len(mass)} computed releases are alike, so that their blocks are not distributed "
+        hint += "at random: let releases differ, for example by a disturbance of the source"
+        raise BadInput(f"observed deposit of {one.event}", one.name, hint)
+    count = round(alone / between * one.releases)
     if count < LEAST_VALUES:
         hint = (
             f"a deposit of {one.releases} releases has as little information as {count} blocks, "
@@ -167,6 +193,39 @@ def independent_blocks(site: Site, one: DataSet, seeds: range) -> int:
         )
         raise BadInput(f"observed deposit of {one.event}", count, hint)
     return min(count, DEPOSIT_PIECES)
+
+
+def _check_stops(one: DataSet, stops: Floats, releases: int) -> None:
+    """Check that rock of computed releases stops in more than one interval of a deposit.
+
+    Parameters
+    ----------
+    one : DataSet
+        The deposit.
+    stops : (N,) array
+        Chainages within the deposit at which blocks of the computed releases stop [m].
+    releases : int
+        Number of computed releases.
+
+    Raises
+    ------
+    BadInput
+        If no block stops within the deposit, or if all blocks stop in the same interval.
+    """
+    ends, where = one.values, f"observed deposit of {one.event}"
+    ground = (
+        "or change the ground (a fit computes these releases with its numbers in the middle of "
+        "their limits LOW:HIGH)"
+    )
+    held = np.unique(np.searchsorted(ends[1:-1], stops))
+    if not len(held):
+        span = f"{chainage(ends[0])} to {chainage(ends[-1])} m"
+        hint = f"no rock of {releases} computed releases stops there: correct the event or the "
+        raise BadInput(where, span, f"{hint}chainages, {ground}")
+    if len(held) == 1:
+        span = f"{chainage(ends[held[0]])} to {chainage(ends[held[0] + 1])} m"
+        hint = f"all rock of {releases} computed releases that stops within the deposit stops in "
+        raise BadInput(where, span, f"{hint}this interval: divide it, {ground}")
 
 
 def observed_values(site: Site, sets: DataSets, seeds: range) -> dict[str, Floats]:
@@ -376,6 +435,38 @@ class Fit(NamedTuple):
         return all(one.quantity == OBSERVED_RUN_OUT for one in self.sets.values())
 
 
+def values_to_fit(
+    site: Site,
+    sets: DataSets,
+    parameters: Sequence[Parameter],
+    releases: int,
+    seed: int,
+    model: Model = "blocks",
+) -> dict[str, Floats]:
+    """Check the arguments of a fit and return the observed values of each set, by name.
+
+    Parameters
+    ----------
+    site, sets, parameters, releases, seed, model
+        See `fit`.
+
+    Raises
+    ------
+    BadInput
+        If a parameter is unknown, is repeated or has no influence on the run-outs of the model, if
+        the site is invalid at a limit, if the model cannot compute an observed quantity, or as
+        `independent_blocks` does.
+    Diverged
+        If a simulation diverges.
+    """
+    check_parameters(parameters, model)
+    check_quantities(sets, model)
+    low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("low", "high"))
+    with_values(site, parameters, list(low)), with_values(site, parameters, list(high))
+    middle = with_values(site, parameters, list(0.5 * (low + high)))
+    return observed_values(middle, sets, range(seed, seed + releases))
+
+
 def fit(
     site: Site,
     sets: DataSets,
@@ -386,6 +477,7 @@ def fit(
     tick: Tick,
     model: Model = "blocks",
     out: Path | None = None,
+    observed: Mapping[str, Floats] | None = None,
 ) -> Fit:
     """Fit parameters of a site to observations.
 
@@ -410,20 +502,18 @@ def fit(
     out : path, optional
         Folder in which computed values are kept until `rigdda.files.remove_unfinished`, so that a
         fit that was killed continues from there.
+    observed : mapping of str to (n,) array, optional
+        What `values_to_fit` returns for the same arguments, if this is known already.
 
     Raises
     ------
     BadInput
-        If a parameter is unknown, is repeated or has no influence on the run-outs of the model, if
-        the site is invalid at a limit, or if the model cannot compute an observed quantity.
+        As `values_to_fit` does.
     Diverged
         If a simulation diverges.
     """
-    check_parameters(parameters, model)
-    low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("low", "high"))
-    with_values(site, parameters, list(low)), with_values(site, parameters, list(high))
-    middle = with_values(site, parameters, list(0.5 * (low + high)))
-    observed = observed_values(middle, sets, range(seed, seed + releases))
+    if observed is None:
+        observed = values_to_fit(site, sets, parameters, releases, seed, model)
 
     def compute(values: Floats, seeds: range) -> Mapping[str, Floats]:
         changed = with_values(site, parameters, list(values))
@@ -652,33 +742,56 @@ def write(path: Path, fitted: Fit) -> None:
 
 def draw(path: Path, fitted: Fit) -> None:
     """Write a PNG of the cumulative distributions of observed and computed values."""
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    from rigdda.app.reports.pictures import save
+    from rigdda.app.reports.pictures import FONT, save
 
     observed = fitted.observed
     names = ["all", *observed] if len(observed) > 1 and fitted.pooled else list(observed)
-    figure = Figure(figsize=(3.2 * len(names) + 0.6, 3.6), layout="constrained")
-    for axes, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
-        own = list(observed) if name == "all" else [name]
-        real = np.concatenate([observed[e] for e in own])
-        weight = [len(observed[e]) / len(real) for e in own]
-        grid = np.linspace(min(0.0, real.min()), 1.25 * real.max(), 400)
-        share = sum(w * (fitted.best.run_outs[e][:, None] <= grid).mean(axis=0)
-                    for w, e in zip(weight, own, strict=True))  # fmt: skip
-        half = 1.96 * np.sqrt(share * (1.0 - share) / len(real))
-        axes.fill_between(grid, np.clip(share - half, 0, 1), np.clip(share + half, 0, 1),
-                          color="#1c5aa0", alpha=0.2, lw=0)  # fmt: skip
-        axes.plot(grid, share, color="#1c5aa0", label="computed, 95 % band of samples of this size")
-        axes.ecdf(np.concatenate([_shown(fitted, e) for e in own]), color="#c0392b",
-                  label="observed")  # fmt: skip
-        deposits = [e for e in own if e in fitted.sets and fitted.sets[e].quantity == DEPOSIT]
-        words = f"as {len(real)} blocks" if deposits else f"{len(real)} observed"
-        axes.set(xlabel=_axis(fitted, own[0]), title=f"{name}: {words}", ylim=(0, 1))
-    figure.axes[0].set_ylabel("share of blocks")
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center",
-                  fontsize=8, frameon=False)  # fmt: skip
-    save(figure, path)
+    with rc_context(FONT):
+        figure = Figure(figsize=(3.2 * len(names) + 0.6, 3.6), layout="constrained")
+        for axes, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
+            own = list(observed) if name == "all" else [name]
+            _draw_distributions(axes, fitted, own)
+            deposits = [e for e in own if e in fitted.sets and fitted.sets[e].quantity == DEPOSIT]
+            count = sum(len(observed[e]) for e in own)
+            words = f"as {count} blocks" if deposits else f"{count} observed"
+            axes.set_title(f"{name}\n{words}", fontsize=10)
+            axes.set(xlabel=_axis(fitted, own[0]), ylim=(0, 1))
+        figure.axes[0].set_ylabel("share of blocks")
+        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center",
+                      fontsize=8, frameon=False)  # fmt: skip
+        save(figure, path)
+
+
+GRID_POINTS, GRID_MARGIN = 400, 0.05
+"""Number of places at which a computed distribution is drawn, and length of the axis beyond the
+least and the greatest value, divided by the range of the values [-]."""
+
+
+def _draw_distributions(axes: Axes, fitted: Fit, own: Sequence[str]) -> None:
+    """Draw the cumulative distributions of the observed and computed values of some sets."""
+    count = sum(len(fitted.observed[e]) for e in own)
+    real = np.concatenate([_shown(fitted, e) for e in own])
+    grid = _grid(np.concatenate([real, *(fitted.best.run_outs[e] for e in own)]))
+    share = np.zeros(len(grid))
+    for e in own:
+        below = (fitted.best.run_outs[e][:, None] <= grid).mean(axis=0)
+        share += len(fitted.observed[e]) / count * below
+    half = 1.96 * np.sqrt(share * (1.0 - share) / count)
+    axes.fill_between(grid, np.clip(share - half, 0, 1), np.clip(share + half, 0, 1),
+                      color="#1c5aa0", alpha=0.2, lw=0)  # fmt: skip
+    axes.plot(grid, share, color="#1c5aa0", label="computed, 95 % band of samples of this size")
+    axes.ecdf(real, color="#c0392b", label="observed")
+    axes.set_xlim(grid[0], grid[-1])
+
+
+def _grid(values: Floats) -> Floats:
+    """Return places at which a distribution of some values is drawn, from below to above them."""
+    low, high = float(values.min()), float(values.max())
+    margin = GRID_MARGIN * (high - low) or GRID_MARGIN * abs(high) or 1.0
+    return np.linspace(low - margin, high + margin, GRID_POINTS)
 
 
 def _axis(fitted: Fit, name: str) -> str:

@@ -107,19 +107,33 @@ def read(paths: Sequence[Path], site: Site) -> dict[str, DataSet]:
     BadInput
         If a file is not a table with the columns of one of the three forms and, for a site with
         several events, `event`; if a run-out is beyond the road, where computed run-outs are cut
-        off; if no block of an event can pass a station; if intervals have gaps; or if there are
-        fewer than three values or two intervals.
+        off; if no block of an event can pass a station; if intervals have gaps; if the names of two
+        sets of observations are the same, see `DataSet.name`; or if there are fewer than three
+        values or two intervals.
     """
     found: dict[str, DataSet] = {}
     for path in paths:
         for one in _read(path, site):
             if one.name in found:
-                hint = f"give the observations {one.name!r} in one file only"
-                raise BadInput("observed", str(path), hint)
+                raise _repeated(path, found[one.name], one)
             found[one.name] = one
     if sum(len(one.values) for one in found.values()) < LEAST_VALUES:
         raise BadInput("observed", str(paths[0]), "give three observed runs or more")
     return found
+
+
+def _repeated(path: Path, first: DataSet, second: DataSet) -> BadInput:
+    """Return the error for observations in a file that have the name of earlier ones."""
+    where, event = f"observed {path}", second.event
+    if (first.event, first.quantity) != (event, second.quantity):
+        hint = f"rename this event: {second.name!r} would be the name of observations of the event "
+        hint += f"{first.event!r}, too"
+        return BadInput(f"{where} event", event, hint)
+    if first.station != second.station and second.passes:
+        hint = f"give {first.station!r} for both, or stations that are farther apart: in tables, "
+        hint += f"both would be at {chainage(first.station)} m"
+        return BadInput(f"{where} station_m", second.station, hint)
+    return BadInput("observed", str(path), f"give the observations {first.name!r} in one file only")
 
 
 def _read(path: Path, site: Site) -> list[DataSet]:
@@ -270,13 +284,24 @@ def _deposit(
     if len(rows) < 2 or not amounts.any():
         hint = "give two intervals or more, and rock in at least one"
         raise BadInput(f"{file} {amount} of {event}", amounts.tolist(), hint)
-    counts = {row[0][1].get("releases", "1") for row in rows}
+    counts = {_releases(row[0]) for row in rows}
     if len(counts) > 1:
         hint = "give the same number of releases in all rows of an event"
-        raise BadInput(f"{file} releases of {event}", ", ".join(sorted(counts)), hint)
-    (text,) = counts
-    if not text.isdecimal():
-        raise BadInput(f"{rows[0][0][0]} releases", text, "give a whole number")
-    count = check.integer(f"{rows[0][0][0]} releases", int(text), 1, JOB_RELEASES)
+        raise BadInput(f"{file} releases of {event}", ", ".join(map(str, sorted(counts))), hint)
+    (count,) = counts
     shares = amounts / amounts.sum()
     return DataSet(DEPOSIT, event, np.array(edges), math.nan, shares, count)
+
+
+def _releases(row: Row) -> int:
+    """Return the number of releases that made the deposit of a row, 1 by default.
+
+    A number of thousands of digits is infinite as a float, and Python refuses to convert it to an
+    integer.
+    """
+    where, text = f"{row[0]} releases", row[1].get("releases", "1")
+    try:
+        value = check.parsed(text)
+    except ValueError:
+        value = math.nan
+    return check.integer(where, int(value) if value.is_integer() else text, 1, JOB_RELEASES)

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Layout, Site, check, fields
+from rigdda.app.terminal import note
 from rigdda.files import is_file
 from rigdda.files import read as read_text
 from rigdda.ground.grounds import GROUNDS, OTHER, USUAL
@@ -173,29 +174,75 @@ def plausible(site: Site, layout: Layout) -> dict[str, tuple[Parameter, ...]]:
     """Return the uncertain numbers of a site with a layout by `GROUPS`.
 
     Numbers without influence are left out: rates and costs of 0, and prices without barriers. So
-    are numbers of which the site permits no other value. Barriers that stand already have prices,
-    too, for upkeep and repair.
+    are numbers of which the site permits no other value, see `unvaried`. Barriers that stand
+    already have prices, too, for upkeep and repair.
+    """
+    groups = _assumed(site, layout)
+    return {name: tuple(one for one in own if _varies(one)) for name, own in groups.items()}
+
+
+def unvaried(names: Sequence[str], site: Site, layout: Layout) -> list[str]:
+    """Return in words which numbers of some groups cannot be varied, and why.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of groups or of single numbers, which are ignored; all groups without names.
+    site, layout : Site, Layout
+        The site and the layout.
+    """
+    groups = _assumed(site, layout)
+    asked = [name for name in GROUPS if name in (names or GROUPS)]
+    used = {event.source for event in site.events}
+    surveyed = [source.name for source in site.sources if source.blocks and source.name in used]
+    found = [
+        f"the volumes of the blocks of source {name!r}, whose corners are surveyed"
+        for name in surveyed
+        if "sizes" in asked
+    ]
+    fixed = [one.path for name in asked for one in groups[name] if not _varies(one)]
+    return found + [f"{path}, of which the site permits no other value" for path in fixed]
+
+
+NARROWEST = 1e-6
+"""Length of a range relative to its ends from which it is more than rounding [-]."""
+
+
+def _varies(one: Parameter) -> bool:
+    """Return whether a parameter has more than one value."""
+    return one.high - one.low > NARROWEST * max(abs(one.low), abs(one.high))
+
+
+def _assumed(site: Site, layout: Layout) -> dict[str, tuple[Parameter, ...]]:
+    """Return the uncertain numbers of a site by `GROUPS`, with the ranges that it permits.
+
+    The limits of a number of which the site permits no other value are equal but for rounding.
     """
     sizes = [_factor(f"events.{e.name}.size", 1.0, "size") for e in site.events if e.area]
     sized = (s for s in site.sources if s.edges is not None or s.polygon)
     sizes += [_factor(f"sources.{source.name}.size", 1.0, "size") for source in sized]
     rates = [_factor(f"events.{e.name}.rate", e.rate, "rate") for e in site.events if e.rate > 0.0]
+    factors = (sizes, rates, _money(site, layout))
+    permitted = (tuple(_permitted(site, one) for one in group) for group in factors)
+    return dict(zip(GROUPS, (ground(site), *permitted), strict=True))
+
+
+def _money(site: Site, layout: Layout) -> list[Parameter]:
+    """Return the uncertain prices and consequences of a site with a layout."""
     harm = site.consequences
-    money = [
+    found = [
         _factor(f"consequences.{name}", getattr(harm, name), "cost")
         for name in ("closure", "days_base", "days_factor", "clearing")
         if getattr(harm, name) > 0.0
     ]
     if layout:
         low, high = min(INTEREST[0], site.prices.interest), max(INTEREST[1], site.prices.interest)
-        money.append(Parameter("prices.interest", low, high))
+        found.append(Parameter("prices.interest", low, high))
     if site.standing(layout) or layout:
-        money.append(_factor("prices.level", 1.0, "level"))
+        found.append(_factor("prices.level", 1.0, "level"))
         if site.prices.removal > 0.0:
-            money.append(_factor("prices.removal", site.prices.removal, "cost"))
-    factors = ([_permitted(site, one) for one in group] for group in (sizes, rates, money))
-    kept = (tuple(one for one in group if one.low < one.high) for group in factors)
-    return dict(zip(GROUPS, (ground(site), *kept), strict=True))
+            found.append(_factor("prices.removal", site.prices.removal, "cost"))
+    return found
 
 
 def _factor(path: str, value: float, kind: str) -> Parameter:
@@ -307,15 +354,23 @@ def with_values(site: Site, parameters: Sequence[Parameter], values: Sequence[fl
 def set_numbers(site: Site, paths: Sequence[str], values: Sequence[float]) -> Site:
     """Return a copy of a site with other values of the numbers with some paths.
 
+    Factors multiply these values, in whatever order the paths are given.
+
     Raises
     ------
     BadInput
         If there is no such number, or if the site is invalid with the value.
     """
     tables = msgspec.to_builtins(site)
-    for path, value in zip(paths, values, strict=True):
+    for path, value in sorted(zip(paths, values, strict=True), key=lambda one: _is_factor(one[0])):
         _set(site, tables, path, float(value))
     return fields.read(Site, tables)
+
+
+def _is_factor(path: str) -> bool:
+    """Return whether a path names a factor on numbers of the site, see `Parameter`."""
+    top, last = path.partition(".")[0], path.rpartition(".")[2]
+    return path == "prices.level" or (last == "size" and top in ("events", "sources"))
 
 
 def _set(site: Site, tables: dict[str, Any], path: str, value: float) -> None:
@@ -328,8 +383,9 @@ def _set(site: Site, tables: dict[str, Any], path: str, value: float) -> None:
     if path == "prices.level":
         return _scale_prices(tables, value)
     table = _table(site, tables, path)
-    if last == "size" and table is not None and top in ("events", "sources"):
-        return _scale_blocks(path, top, table, value)
+    if _is_factor(path) and table is not None:
+        scale = _scale_event if top == "events" else _scale_source
+        return scale(site, path, table, value)
     own = Rebound.__struct_fields__ if top == "lumped" else ()
     known = table is not None and (last in table or last in own)
     if table is None or not known:
@@ -373,23 +429,38 @@ def _scale_prices(tables: dict[str, Any], factor: float) -> None:
         mesh["price"] *= factor
 
 
-def _scale_blocks(path: str, top: str, table: dict[str, Any], factor: float) -> None:
-    """Multiply the volumes of the blocks of an event or a source by a factor."""
+def _scale_event(site: Site, path: str, table: dict[str, Any], factor: float) -> None:
+    """Multiply the volumes of the blocks of an event by a factor, whatever their distribution."""
+    if table["area"] is None:
+        source = site.source(table["source"])
+        hint = f"name sources.{source.name}.size: the source determines the blocks"
+        if source.blocks:
+            hint = f"leave it out: the blocks of source {source.name} are surveyed"
+        raise BadInput("--parameters", path, hint)
+    if table["volumes"] is not None:
+        table["volumes"] = [factor * volume for volume in table["volumes"]]
+        table["area"] = None  # it follows from the volumes
+        return
+    if table["volume_median"] is not None:
+        table["volume_median"] *= factor
+    table["area"] = [factor**VOLUME_EXPONENT * area for area in table["area"]]
+
+
+def _scale_source(site: Site, path: str, table: dict[str, Any], factor: float) -> None:
+    """Multiply the volumes of the blocks of a source by a factor."""
     area, length = factor**VOLUME_EXPONENT, factor ** (VOLUME_EXPONENT / 2.0)
-    if top == "events":
-        if table["area"] is None:
-            hint = f"name sources.{table['source']}.size: the source determines the blocks"
-            raise BadInput("--parameters", path, hint)
-        table["area"] = [area * value for value in table["area"]]
-    elif table["edges"] is not None:
+    if table["edges"] is not None:
         table["edges"] = [length * edge for edge in table["edges"]]
     elif table["block_area"] is not None:
         table["block_area"] *= area
     elif table["joints"]:
         table["joints"] = [j | {"spacing": length * j["spacing"]} for j in table["joints"]]
+    elif table["blocks"]:
+        raise BadInput("--parameters", path, "leave it out: the blocks of this source are surveyed")
     else:
-        hint = "leave it out: the blocks of this source are surveyed, or its events determine them"
-        raise BadInput("--parameters", path, hint)
+        own = [f"events.{e.name}.size" for e in site.events if e.source == table["name"]]
+        hint = f"name {' or '.join(own)}" if own else "leave it out"
+        raise BadInput("--parameters", path, f"{hint}: events determine the blocks of this source")
 
 
 WEIGHT = "weight"
@@ -514,13 +585,21 @@ def inputs(
 ) -> tuple[Input, ...]:
     """Return the inputs of an analysis: those of `choose`, and a posterior instead of its numbers.
 
+    A note names the numbers of the groups that cannot be varied.
+
     Raises
     ------
     BadInput
-        As `choose` and `read_posterior` do.
+        As `choose` and `read_posterior` do, or if no number of the groups can be varied.
     """
-    chosen = choose(names, site, layout)
-    if posterior is None:
-        return chosen
-    joint = read_posterior(posterior, site)
-    return (joint, *(one for one in chosen if one.path not in joint.paths))
+    chosen: tuple[Input, ...] = choose(names, site, layout)
+    if posterior is not None:
+        joint = read_posterior(posterior, site)
+        chosen = (joint, *(one for one in chosen if one.path not in joint.paths))
+    left = "; ".join(unvaried(names, site, layout))
+    if not chosen:
+        hint = "name other numbers or groups: no number of these can be varied on this site"
+        asked = ", ".join(names or GROUPS)
+        raise BadInput("--parameters", asked, f"{hint} ({left})" if left else hint)
+    note(f"not varied: {left}" if left else "")
+    return chosen

@@ -96,7 +96,7 @@ def png(section: Section, title: str = "") -> bytes:
     axes = figure.subplots()
     draw(axes, section)
     if title:
-        axes.set_title(title, loc="left", fontsize=10)
+        axes.set_title(title, loc="left", fontsize=10, parse_math=False)
     handles, _ = axes.get_legend_handles_labels()
     if handles:
         figure.legend(loc="outside lower center", ncols=len(handles), frameon=False, fontsize=9)

@@ -14,6 +14,7 @@ from PIL import Image
 from rigdda import BadInput, Ditch, Embankment, Fence, Run, Site, display, release
 from rigdda.agents import constant
 from rigdda.envs import DesignProblem, Targets
+from rigdda.envs.rendering import picture
 
 LAYOUT = (Fence(17.0, 3.0, energy_class=1000), Ditch(30.3, 1.0, 3.0))
 
@@ -51,6 +52,13 @@ def test_sources_of_every_kind_are_drawn(name: str) -> None:
     section = Site.load(name).section()
     assert section.sources
     assert all(corners.shape[1] == 2 and len(corners) >= 2 for corners in section.sources)
+
+
+def test_a_name_with_signs_of_dollars_is_drawn_as_it_is(site: Site, run: Run) -> None:
+    """Between two of them, matplotlib would read a formula, and \\frac alone is none."""
+    name = r"cut $\frac$"
+    assert display.png(site.section(), name)
+    assert picture(run, site, LAYOUT, name).any()
 
 
 def test_a_section_holds_the_barriers_of_a_layout(site: Site) -> None:

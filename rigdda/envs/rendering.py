@@ -317,7 +317,7 @@ def picture(run: Run, site: Site, layout: Layout, title: str) -> NDArray[np.uint
     axes = figure.subplots()
     draw(axes, run, (site.road.start, site.road.end), old=site.existing_barriers)
     name_places(axes, site, (site.barrier_zone.start, site.barrier_zone.end))
-    axes.set_title(title)
+    axes.set_title(title, parse_math=False)
     left, right, bottom, top = window(run, site)
     axes.set(xlim=(left, right), ylim=(bottom, top))
     labels = []

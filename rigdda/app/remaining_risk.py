@@ -11,8 +11,8 @@ from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.menu import Menu
 from rigdda.app.design_study import design_events
 from rigdda.app.reports import findings
+from rigdda.app.reports.wording import figure
 from rigdda.envs import DesignProblem, Evaluation
-from rigdda.geometry import polygon_properties
 from rigdda.seeds import release_seeds
 
 STATIONS = 3
@@ -76,30 +76,27 @@ def trial_layouts(problem: DesignProblem) -> tuple[Layout, ...]:
 def failed_trials(problem: DesignProblem, event: str, seed: int) -> str:
     """Return a text that says that none of the largest single barriers stops an event.
 
-    The text is empty if one of them stops the event in half of the releases or more, or if none may
-    be built.
+    It gives the range of the volumes of these releases, which are the same with each barrier. The
+    text is empty if one of the barriers stops the event in half of the releases or more, or if none
+    may be built.
 
     Raises
     ------
     Diverged
         If a simulation diverges.
     """
-    layouts = trial_layouts(problem)
+    layouts, volumes = trial_layouts(problem), list[float]()
     seeds = {event: release_seeds("ensemble", seed, RELEASES)}
     for layout in layouts:
         outcomes = problem.sample(layout, seeds)
+        volumes = [outcome.released_volume / outcome.width for outcome in outcomes]
         if sum(outcome.reached for outcome in outcomes) <= HOLDS * len(outcomes):
             return ""
     if not layouts:
         return ""
-    volume = _volume(problem, event, seeds[event][0])
+    low, high = min(volumes), max(volumes)
+    size = figure(low) if low == high else f"{figure(low, 'down')} to {figure(high, 'up')}"
     return (
         f"none of {len(layouts)} large single barriers that were tried stops the event {event!r} "
-        f"({volume:.2g} m3 per metre) in at least half of {RELEASES} releases"
+        f"in at least half of {RELEASES} releases of {size} m3 per metre"
     )
-
-
-def _volume(problem: DesignProblem, event: str, seed: int) -> float:
-    """Return the volume of rock in a release of an event [m3 per metre]."""
-    blocks = problem.site.draw(seed, event).blocks
-    return float(sum(polygon_properties(block.vertices)[0] for block in blocks))

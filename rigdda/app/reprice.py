@@ -37,7 +37,7 @@ from rigdda.envs.cost import account, judge
 from rigdda.envs.ensemble import Ensemble, statistics
 from rigdda.envs.intervals import Estimate, estimate
 from rigdda.envs.outcome_cache import NO_EVENT_MOTION, NO_MOTION
-from rigdda.envs.problem import MISSED, End, Targets, read_targets
+from rigdda.envs.problem import MISSED, End, Targets, can_fail, read_targets
 from rigdda.model.site_tables import SECTION
 from rigdda.seeds import is_of_stream
 
@@ -559,7 +559,8 @@ def _candidate(
         risk = problem.individual_risk(layout, killed)
     ends: tuple[End, ...] = ("upper", "value", "lower")
     reach, failure = ([pair[which] for pair in chances.values()] for which in range(2))
-    over = [problem.targets.excess(reach, failure, risk, end) for end in ends]
+    failing = failure if can_fail(site, layout) else []
+    over = [problem.targets.excess(reach, failing, risk, end) for end in ends]
     tried = None
     if chances:
         tried = TriedLayout(layout, site.capital(layout), worst(reach), worst(failure))

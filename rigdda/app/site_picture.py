@@ -143,12 +143,10 @@ def _names(site: Site) -> list[Label]:
 def _draw_standing(axes: Axes, site: Site) -> list[Label]:
     """Draw the barriers that stand already and return their labels."""
     built = site.standing()
-    _, moved = earthworks(site.profile, built, site.soil)
+    ground, moved = earthworks(site.profile, built, site.soil)
     labels = []
     for barrier, words in zip(built, site.labels(), strict=True):
-        outline = (
-            moved[barrier] if isinstance(barrier, Earthwork) else barrier.outline(site.profile)
-        )
+        outline = moved[barrier] if isinstance(barrier, Earthwork) else barrier.outline(ground)
         draw_barrier(axes, barrier, outline, colour=OLD, old=True)
         labels.append(Label(words, top_of(outline), OLD))
     return labels

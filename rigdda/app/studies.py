@@ -125,7 +125,7 @@ def _impossible(site: Site, layout: Layout) -> list[BadInput]:
     faults: list[BadInput] = []
     for part in (*((barrier,) for barrier in layout), layout):
         try:
-            site.realise(part)
+            site.realise(part, event=site.event_names[0])  # rates may not be known yet
             check.number("capital", site.capital(part))
         except BadInput as bad:
             if part != layout or not faults:

@@ -86,6 +86,19 @@ class Known(NamedTuple):
         mean = float(sample.mean())
         return cls(mean, float(sample.std() / mean) if mean > 0.0 else 0.0)
 
+    def sample(self, count: int, releases: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return costs of releases with these statistics, and which of them are costly.
+
+        Of `releases`, `count` are costly; the others cost 0.
+        """
+        costly = np.arange(releases) < count
+        signs = np.resize([1.0, -1.0], count)
+        signs[count - count % 2 :] = 0.0
+        scale = math.sqrt(count / max(count - count % 2, 1))
+        costs = np.zeros(releases)
+        costs[:count] = self.mean * (1.0 + self.variation * scale * signs)
+        return costs, costly
+
 
 class Mean(NamedTuple):
     """A mean and its 95 % interval."""

@@ -88,21 +88,25 @@ class Targets:
         ----------
         events : iterable of str
             The design events.
-        reach, failure : mapping of str to Estimate
+        reach : mapping of str to Estimate
             Estimates for each event.
+        failure : mapping of str to Estimate
+            Estimates for each event; empty if no barrier can fail, which meets any target.
         risk : Risk or None
             Risk to the traffic; None only if there is no target `individual`.
         """
-        states = {
+        if not self.given:
+            return None
+        states = {MET} | {
             decide(seen[event], greatest)
             for seen, greatest in ((reach, self.reach), (failure, self.failure))
-            if greatest is not None
+            if greatest is not None and seen
             for event in events
         }
         if self.individual is not None:
             assert risk is not None, "the target `individual` needs [traffic]"
             states.add(decide_mean(risk.individual, self.individual))
-        return next((state for state in (MISSED, UNDECIDED, MET) if state in states), None)
+        return next(state for state in (MISSED, UNDECIDED, MET) if state in states)
 
     def excess(
         self,
@@ -119,7 +123,8 @@ class Targets:
         Parameters
         ----------
         reach, failure : iterable of Estimate
-            Estimates for the design events. One without releases counts as 1.
+            Estimates for the design events. One without releases counts as 1. `failure` is empty if
+            no barrier can fail.
         risk : Risk or Mean or None
             Risk to the traffic, or the individual risk itself; None only if there is no target
             `individual`.
@@ -135,6 +140,14 @@ class Targets:
             individual = risk.individual if isinstance(risk, Risk) else risk
             over.append(excess(of_mean(individual, end), self.individual))
         return max(over)
+
+
+def can_fail(site: Site, layout: Layout) -> bool:
+    """Return whether a barrier that stands on a site with a layout can fail.
+
+    Ditches, mesh and rigid walls cannot. Existing barriers count if the layout keeps them.
+    """
+    return any(barrier.fallible for barrier in site.standing(layout))
 
 
 End = Literal["upper", "value", "lower"]
@@ -310,7 +323,9 @@ def checked_seeds(name: str, seeds: Sequence[int], least: int = 1) -> tuple[int,
 
 def is_vector(layout: object) -> bool:
     """Return whether `layout` is a sequence that begins with a number."""
-    return isinstance(layout, Sequence) and len(layout) > 0 and isinstance(layout[0], int | float)
+    if not isinstance(layout, Sequence) or len(layout) == 0:
+        return False
+    return isinstance(layout[0], int | float | np.number)
 
 
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -644,19 +659,15 @@ class DesignProblem:
         """
         if evaluation.targets == MISSED:
             reach, failure = (
-                [seen[name] for name in self._design_events if seen[name].releases]
-                for seen in (evaluation.reach, evaluation.failure)
+                [chance for chance in chances if chance.releases]
+                for chances in self._chances(evaluation)
             )
             return -1.0 - self.targets.excess(reach, failure, evaluation.risk, "value")
         return evaluation.gain(self._known.nothing)
 
     def excess(self, evaluation: Evaluation, end: End = "upper") -> float:
         """Return the largest excess of an evaluation over a target, see `Targets.excess` [-]."""
-        reach, failure = (
-            [seen[name] for name in self._design_events]
-            for seen in (evaluation.reach, evaluation.failure)
-        )
-        return self.targets.excess(reach, failure, evaluation.risk, end)
+        return self.targets.excess(*self._chances(evaluation), evaluation.risk, end)
 
     @property
     def _design_events(self) -> list[str]:
@@ -664,7 +675,19 @@ class DesignProblem:
 
     def state(self, found: Evaluation) -> str | None:
         """Return whether an evaluation meets the targets; None without targets."""
-        return self.targets.state(self._design_events, found.reach, found.failure, found.risk)
+        failure = found.failure if can_fail(self.site, found.layout) else {}
+        return self.targets.state(self._design_events, found.reach, failure, found.risk)
+
+    def _chances(self, found: Evaluation) -> tuple[list[Estimate], list[Estimate]]:
+        """Return the probabilities of reach and of failure in the design events.
+
+        There are none of failure if no barrier can fail.
+        """
+        failure = self._design_events if can_fail(self.site, found.layout) else []
+        return (
+            [found.reach[name] for name in self._design_events],
+            [found.failure[name] for name in failure],
+        )
 
     def individual_risk(self, layout: Layout, fatalities: Mapping[str, Sequence[float]]) -> Mean:
         """Return the individual risk from the fatalities in releases of each event [1/year].
@@ -680,20 +703,21 @@ class DesignProblem:
         Raises
         ------
         BadInput
-            If the site has no `[traffic]`.
+            If the site has no `[traffic]`, or no event of such a name.
         """
         site, facts = self.site, self._known.facts
         if site.traffic is None:
             raise BadInput("traffic", None, f"add the table [traffic] to site {site.name}")
+        for name in fatalities:
+            check.one_of("fatalities", name, site.event_names)
         parts = []
         for name in site.event_names:
             fact = facts[name]
-            known, killed = fact.toll[2], list(fatalities.get(name, ()))
-            if not killed:
-                count = fact.toll_counts[2]
-                killed = [known.mean] * count + [0.0] * (fact.releases - count)
-            own = np.array(killed, dtype=np.float64)
-            mean = intervals.mean_cost(own, own > 0.0, known)
+            known, own = fact.toll[2], np.array(fatalities.get(name, ()), dtype=np.float64)
+            costly = own > 0.0
+            if not own.size:
+                own, costly = known.sample(fact.toll_counts[2], fact.releases)
+            mean = intervals.mean_cost(own, costly, known)
             parts.append(mean.times(site.rate(name, layout)))
         return total(parts).times(site.traffic.section_length * site.traffic.person)
 

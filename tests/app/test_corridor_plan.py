@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import itertools
 import math
 import time
@@ -604,6 +605,9 @@ def test_the_numbers_of_targets_are_written() -> None:
     assert columns["reach"] in [found.reach[name].probability for name in events]
     assert columns["individual"] is None  # the site has no traffic
     assert corridor_report.risk_columns(problem.nothing, problem.site)["failure_high"] is None
+    ditch = dataclasses.replace(found, layout=(Ditch(9.0, 1.0, 3.0),))
+    assert corridor_report.risk_columns(ditch, problem.site)["failure_high"] is None
+    assert corridor_report.risk_columns(ditch, problem.site)["reach_high"] is not None
     busy = DesignProblem("slab-cut")
     risk = busy.nothing.risk
     assert risk is not None

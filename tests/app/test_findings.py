@@ -7,11 +7,14 @@ from dataclasses import replace
 import pytest
 from valley import SITE, Barren, Valley
 
+from rigdda import Layout, Outcome
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, History
 from rigdda.app.remaining_risk import failed_trials, trial_layouts
 from rigdda.app.reports import findings
+from rigdda.app.reports.wording import figure
 from rigdda.envs import DesignProblem, Evaluation
+from rigdda.seeds import release_seeds
 
 
 def test_what_costs_as_little_a_year_and_less_to_build_is_named(problem: DesignProblem) -> None:
@@ -60,6 +63,28 @@ def test_what_nothing_holds_is_said() -> None:
     assert "large single barriers that were tried stops the event 'block'" in failed_trials(
         Barren(SITE), "block", 0
     )
+
+
+class Uneven(Barren):
+    """Nothing keeps anything off, and the volume of a release is the last digit of its seed."""
+
+    def outcome(self, layout: Layout, seed: int, event: str) -> Outcome:
+        volume = 2.0 * (1 + seed % 10)
+        return replace(super().outcome(layout, seed, event), released_volume=volume, width=2.0)
+
+
+def test_the_volume_of_what_nothing_holds_is_that_of_all_releases() -> None:
+    volumes = [1 + seed % 10 for seed in release_seeds("ensemble", 3, 4)]
+    assert len(set(volumes)) > 1
+    line = failed_trials(Uneven(SITE), "block", 3)
+    size = f"of {min(volumes)} to {max(volumes)} m3 per metre"
+    assert line.endswith(f"in at least half of 4 releases {size}")
+
+
+def test_one_volume_of_all_releases_is_given_once() -> None:
+    width = Barren(SITE).outcome((), 1, "block").width
+    line = failed_trials(Barren(SITE), "block", 0)
+    assert line.endswith(f"releases of {figure(1.0 / width)} m3 per metre")
 
 
 def test_every_kind_that_may_be_built_is_tried() -> None:

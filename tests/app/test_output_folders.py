@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import pytest
 from processes import refused, run
 
@@ -166,3 +167,11 @@ def test_a_conversion_does_not_replace_a_replay(folder: Path) -> None:
     line = refused("replay", "results/run.npz", folder=folder)
     assert "run.rrd" in line and "move it away" in line
     assert (folder / "results/run.rrd").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_study_of_a_site_with_rates_of_arrivals_converts_them(folder: Path) -> None:
+    site = Site.load(folder / "site.toml")
+    events = tuple(msgspec.structs.replace(e, rate_of="arrival") for e in site.events)
+    msgspec.structs.replace(site, events=events).save(folder / "site.toml")
+    (folder / "a.toml").write_text(STUDY, encoding="utf-8")
+    assert "rock arrives" in run("study", "a.toml", "--out", "results", folder=folder)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gzip
+import html
 import json
 import math
+import re
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +18,10 @@ from processes import refused, rows, run
 import rigdda
 from rigdda import MECHANICS, BadInput, Outcome, Site
 from rigdda.agents.designers.frontier import TriedLayout
+from rigdda.agents.run_record import read
 from rigdda.app import archive, design, reprice
 from rigdda.app.barrier_checks import check_layout
-from rigdda.app.reports import design_report, reprice_report
+from rigdda.app.reports import design_report, findings, reprice_report
 from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation, ensemble
 from rigdda.envs.cost import judge
@@ -280,11 +283,74 @@ def test_the_command_answers_in_a_folder_of_its_own(designed: Path, tmp_path: Pa
     assert rigdda.load_layout(tmp_path / "o/layout.toml") == done.chosen.evaluation.layout
     assert rows(tmp_path / "o/frontier.csv") == [
         {k: "" if reprice_empty(v) else str(v) for k, v in row.items()}
-        for row in design_report.frontier_rows(done.frontier)
+        for row in design_report.frontier_rows(done.problem.site, done.frontier)
     ]
     assert "consequences.closure = 20000 (was 50,000)" in words
     assert "no layout was simulated" in words and "best of search" in words
     assert {p.name: p.read_bytes() for p in designed.iterdir() if p.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (("--target", 1.0, "--set", "consequences.closure=1000000"), "Do not build this as it is"),
+        (("--target", 1.0, "--set", "consequences.closure=100"), "Build nothing"),
+        (("--set", "consequences.closure=20000"), "No layout that was found for at most 1,200 EUR"),
+        (("--target", 0.6), "Build"),
+    ],
+)
+def test_a_report_starts_with_the_answer(
+    options: tuple[object, ...], words: str, designed: Path, tmp_path: Path
+) -> None:
+    printed = run("reprice", designed, *options, "--out", "o", folder=tmp_path)
+    (line,) = (line for line in printed.splitlines() if findings.is_headline(line))
+    assert line.startswith(words)
+    assert read(tmp_path / "o")["reprice"].findings.count(line) == 1
+    run("report", "o", "--out", "page", folder=tmp_path)
+    page = (tmp_path / "page/report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
+    summary = re.sub(r"<[^>]+>", "\n", page).partition("Summary")[2].partition("\nSite\n")[0]
+    shown = [html.unescape(text) for text in summary.splitlines() if text.strip()]
+    assert shown[0].strip() == line
+    assert shown.count(line) == 1
+    assert "What limits this answer" in shown
+
+
+def test_two_answers_of_a_report_are_headed_by_their_folders(
+    designed: Path, tmp_path: Path
+) -> None:
+    for name, target in (("low", 0.6), ("high", 0.9)):
+        run("reprice", designed, "--target", target, "--out", name, folder=tmp_path)
+    run("report", "low", "high", "--out", "page", folder=tmp_path)
+    page = (tmp_path / "page/report.html").read_text(encoding="utf-8")
+    assert page.index("Other values in low") < page.index("Other values in high")
+
+
+def test_what_would_decide_a_target_is_a_new_design(designed: Path) -> None:
+    """The command itself releases nothing."""
+    done = reprice.reprice(designed, targets={"reach": None, "failure": 0.06})
+    open_ = replace(done.chosen.evaluation, targets="undecided")
+    cases = (*done.cases[:-1], replace(done.chosen, evaluation=open_))
+    lines = reprice_report.sentences(replace(done, cases=cases))
+    (line,) = (line for line in lines if line.startswith("target "))
+    assert line.endswith("undecided; a new design with a larger --verify would decide it")
+
+
+def test_no_failure_is_estimated_where_nothing_can_fail(designed: Path) -> None:
+    done = reprice.reprice(designed, targets={"reach": None, "failure": 0.001})
+    seen = set()
+    for case, row in zip(done.cases, reprice_report.rows(done), strict=True):
+        kinds = {barrier.kind for barrier in case.evaluation.layout}
+        fallible = bool(kinds & {"fence", "gravity_wall", "embankment"})
+        seen.add(fallible)
+        assert math.isnan(row["failure"]) == math.isnan(row["failure_bound"]) == (not fallible)
+        assert (row["targets"] == "met") == (not fallible)  # 40 releases do not show 0.1 %
+    assert seen == {True, False}
+    candidates = reprice._candidates(done.problem, archive.read(designed)).values()
+    for one in candidates:
+        kinds = {barrier.kind for barrier in one.layout}
+        if not kinds & {"fence", "gravity_wall", "embankment"}:
+            assert (one.over, one.share, one.least) == (0.0, 0.0, 0.0)
+    assert done.chosen.evaluation.targets == "met"
 
 
 def reprice_empty(value: object) -> bool:

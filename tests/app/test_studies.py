@@ -290,6 +290,18 @@ def test_events_of_a_study_are_those_of_its_releases(folder: Path) -> None:
             assert row["energy_on_road_95"] == ""
 
 
+def test_no_failure_is_estimated_where_nothing_can_fail(folder: Path) -> None:
+    """Of the layouts, only the fence can fail: the walls of the file are rigid."""
+    run("study", "study.toml", "--out", "o", folder=folder)
+    table = rows(folder / "o/events.csv")
+    assert {row["layout"] for row in table if row["failure"]} == {"one"}
+    assert {row["layout"] for row in table if row["failure_bound"]} == {"one"}
+    asked = studies.load(folder / "study.toml")
+    shown = study_report.events(studies.results(asked, folder / "o/study.csv"))
+    fails = zip(shown.columns[1].cells, shown.columns[3].cells, strict=True)
+    assert {name for name, cell in fails if cell != "-"} == {"one"}
+
+
 def test_every_violation_of_every_layout_is_named_at_once(folder: Path) -> None:
     text = STUDY.replace("x = 18.0, height = 2.0, energy_class = 500", "x = 500.0, height = -2.0")
     text += """

@@ -23,12 +23,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigdda import BadInput, Ditch, Fence, Outcome, Site, Wall
+from rigdda.barriers import Removal
 from rigdda.envs import compare, design_envelope, ensemble, site_store
 from rigdda.envs import cost as costs
 from rigdda.envs.cost import judge
 from rigdda.envs.outcome_cache import Memory
 from rigdda.envs.problem import DesignProblem, Targets, events_of_seeds
 from rigdda.ground.barrier_zone import BarrierZone
+from rigdda.model.existing import Existing
 from rigdda.model.traffic import Traffic
 
 EVENTS = ("small", "block", "low", "group")
@@ -245,6 +247,31 @@ def test_a_target_of_failure_asks_for_the_failures_of_design_events(site: Site) 
     counts = {"small": 10, "low": 10, "block": 0}
     assert problem.judge(FENCE, hand_made(counts, {"block": 10})).targets == "missed"
     assert problem.judge(FENCE, hand_made(counts, {"small": 10})).targets != "missed"
+
+
+def test_what_cannot_fail_meets_a_target_of_failure(site: Site) -> None:
+    """Ten releases leave the failure of a fence undecided, but that of a ditch is impossible."""
+    problem, outcomes = DesignProblem(site, targets=Targets(failure=0.01)), hand_made({})
+    ditch, wall = (Ditch(12.0, 1.0, 2.0),), (Wall(12.0, 2.0),)
+    for layout in ((), ditch, wall):
+        found = problem.judge(layout, outcomes)
+        assert found.targets == "met"
+        assert [problem.excess(found, end) for end in ("upper", "value", "lower")] == [0.0] * 3
+    assert problem.nothing.targets == "met"
+    found = problem.judge(FENCE, outcomes)
+    assert found.targets == "undecided" and problem.excess(found) > 0.2
+    both = DesignProblem(site, targets=Targets(reach=0.2, failure=0.01))
+    missed = both.judge(ditch, hand_made({"block": 10}))
+    assert missed.targets == "missed"
+    assert both.reward(missed) == -1.0 - (1.0 - 0.2)
+
+
+def test_an_existing_barrier_can_fail_until_it_is_removed(site: Site) -> None:
+    old = Existing("fence", 12.0, 2.0, energy_class=250, removable=True, removal=10.0)
+    stands = msgspec.structs.replace(site, existing=(old,))
+    problem = DesignProblem(stands, targets=Targets(failure=0.01))
+    assert problem.judge((), hand_made({})).targets == "undecided"
+    assert problem.judge((Removal(12.0),), hand_made({})).targets == "met"
 
 
 def test_missed_targets_are_rewarded_behind_all_that_is_not_ruinous(site: Site) -> None:
@@ -553,4 +580,14 @@ def test_an_event_without_releases_has_the_risk_without_barriers() -> None:
     problem = DesignProblem(site)
     found = problem.individual_risk((), {})
     assert problem.nothing.risk is not None
-    assert found.value == pytest.approx(problem.nothing.risk.individual.value, rel=1e-9)
+    assert found == pytest.approx(problem.nothing.risk.individual, rel=1e-9)
+    with pytest.raises(BadInput, match="fatalities = 'avalanche'"):
+        problem.individual_risk((), {"avalanche": [1.0]})
+
+
+def test_a_list_of_numbers_of_numpy_is_a_vector() -> None:
+    problem = DesignProblem(Site.load("quick"))
+    vector = np.full(problem.size, 0.4, np.float32)
+    assert problem.decode(list(vector)) == problem.decode(vector)
+    one, two = problem.evaluate(list(vector), [1]), problem.evaluate(vector, [1])
+    assert one.layout == two.layout and one.objective == two.objective

@@ -23,7 +23,7 @@ from rigdda.envs.intervals import (
     student_interval,
     total,
 )
-from rigdda.envs.problem import MISSED
+from rigdda.envs.problem import MET, MISSED, UNDECIDED
 
 
 def test_none_of_n_has_three_over_n_as_its_upper_end() -> None:
@@ -173,6 +173,15 @@ def test_harm_without_a_block_on_the_road_is_rare_harm() -> None:
     mean = costs._means(own, known, 0.0)[0]
     assert mean.interval == mean_cost(harm, harm > 0.0, known.harm).interval
     assert mean.high > 3.0 * mean.value
+
+
+def test_a_target_of_failure_is_met_if_no_barrier_can_fail() -> None:
+    few = {"block": estimate(0, 5)}
+    assert Targets(failure=0.1).state(["block"], few, few, None) == UNDECIDED
+    assert Targets(failure=0.1).state(["block"], few, {}, None) == MET
+    assert Targets(reach=0.1, failure=0.1).state(["block"], few, {}, None) == UNDECIDED
+    assert Targets().state(["block"], few, {}, None) is None
+    assert Targets(failure=0.1).excess(few.values(), (), None) == 0.0
 
 
 def test_a_target_of_the_individual_risk_is_never_ignored() -> None:

@@ -9,14 +9,29 @@ import pytest
 import tomli_w
 from light_site import LIGHT
 
-from rigdda import Fence, save_layout
+from rigdda import BadInput, Fence, Site, save_layout
 from rigdda.app.cli import main
+from rigdda.app.page import rates
+from rigdda.app.page.barriers_tab import _rules, figures_html
 from rigdda.app.page.falls import ENDS, Release, shares
 from rigdda.app.page.figures import study_table
 from rigdda.app.page.known_layout import CURRENT
 from rigdda.app.page.live import Live
+from rigdda.envs import outcome_cache, site_store, with_release_rates
 
 LAYOUT = (Fence(30.0, 4.0, energy_class=1000),)
+
+
+def _of_arrivals(site: Site, rate: float | None = None) -> Site:
+    """Return a site in which the rate of the first event is that of arrivals."""
+    first = site.events[0]
+    given = msgspec.structs.replace(
+        first, rate_of="arrival", rate=first.rate if rate is None else rate
+    )
+    return msgspec.structs.replace(site, events=(given, *site.events[1:]))
+
+
+ARRIVALS = _of_arrivals(LIGHT)
 
 
 def _wait(live: Live, done) -> None:
@@ -33,12 +48,13 @@ def live():
     made.close()
 
 
-def test_figures_are_those_of_the_command_to_the_digit(live, tmp_path, capsys):
-    live.ask(LIGHT, LAYOUT)
+@pytest.mark.parametrize("site", [LIGHT, ARRIVALS], ids=["releases", "arrivals"])
+def test_figures_are_those_of_the_command_to_the_digit(site, live, tmp_path, capsys):
+    live.ask(site, LAYOUT)
     _wait(live, lambda found: found.releases == 50 and not found.doing)
     found = live.figures
     assert found.checks is not None
-    LIGHT.save(tmp_path / "site.toml")
+    site.save(tmp_path / "site.toml")
     save_layout(LAYOUT, tmp_path / "layout.toml")
     table = study_table("site.toml", LAYOUT, "layout.toml", 50)
     (tmp_path / "study.toml").write_text(tomli_w.dumps(table))
@@ -48,6 +64,70 @@ def test_figures_are_those_of_the_command_to_the_digit(live, tmp_path, capsys):
         with (out / f"{name}.csv").open(newline="") as file:
             rows = [row for row in csv.DictReader(file) if row["layout"] == CURRENT]
         assert rows == [{k: "" if v != v else str(v) for k, v in row.items()} for row in own]
+
+
+def test_rates_of_arrivals_are_converted_and_told_in_the_background(live):
+    live.ask(ARRIVALS, LAYOUT)
+    _wait(live, lambda found: found.releases == 50 and not found.doing)
+    found = live.figures
+    assert (found.broken, found.fault, found.failure) == ((), "", "")
+    (note,) = found.notes
+    used = with_release_rates(ARRIVALS).events[0].rate
+    assert used > ARRIVALS.events[0].rate
+    assert f"{used:.3g} releases a year per 100 m are used" in note
+    assert "P(arrival)" in figures_html(found, "red", "grey")
+    assert live.known(ARRIVALS, LAYOUT) == found
+
+
+def test_releases_for_a_rate_are_simulated_in_portions_and_only_once(tmp_path, monkeypatch):
+    slower = msgspec.structs.replace(LIGHT.motion, duration=23.5)  # no other test simulates it
+    site = _of_arrivals(msgspec.structs.replace(LIGHT, motion=slower))
+    monkeypatch.setattr(site_store, "path_of", lambda name, key: tmp_path / f"{name}-{key.hex()}")
+    sizes, simulate = [], outcome_cache.outcomes
+
+    def counted(jobs):
+        sizes.append(len(jobs))
+        return simulate(jobs)
+
+    monkeypatch.setattr(outcome_cache, "outcomes", counted)
+    told = list(rates.simulate(site))
+    assert len(sizes) == len(told) > 4
+    assert sizes[0] == 4
+    assert told[-1] == (
+        f"computing the rate of block from {sum(sizes):,} releases without new barriers"
+    )
+    monkeypatch.setattr(outcome_cache, "outcomes", lambda jobs: pytest.fail("it simulates"))
+    found = rates.released(site)
+    assert found.site == with_release_rates(site)
+    assert f"from {sum(sizes):,} releases" in found.notes[0]
+    assert list(rates.simulate(LIGHT)) == []
+    assert rates.released(LIGHT) == (LIGHT, ())
+
+
+def test_a_rate_that_cannot_be_converted_does_not_blame_the_layout(live):
+    site = _of_arrivals(LIGHT, 999.0)
+    with pytest.raises(BadInput, match="lower rate of arrivals"):
+        with_release_rates(site)
+    live.ask(site, LAYOUT)
+    _wait(live, lambda found: bool(found.failure))
+    found = live.figures
+    assert (found.broken, found.fault, found.doing) == ((), "", "")
+    assert "lower rate of arrivals" in found.failure
+    told = _rules(found, "red")
+    assert "in the tab Slope" in told
+    assert "figures cannot be computed" in told
+    assert "may not be built" not in told and "rigdda.envs" not in told
+    live.ask(LIGHT, LAYOUT)
+    _wait(live, lambda found: found.costs is not None)
+    assert _rules(live.figures, "red") == ""
+
+
+def test_an_impossible_layout_is_told_before_rates_are_converted(live, monkeypatch):
+    monkeypatch.setattr(rates, "simulate", lambda site: pytest.fail("it converts rates"))
+    live.ask(ARRIVALS, (Fence(500.0, 3.0, energy_class=1000),))
+    _wait(live, lambda found: bool(found.fault or found.failure))
+    assert live.figures.broken and live.figures.failure == ""
+    assert "may not be built" in _rules(live.figures, "red")
 
 
 def test_another_price_needs_no_new_release(live, monkeypatch):

@@ -7,7 +7,25 @@ import pytest
 import rigdda
 from rigdda import BadInput, Site, sites
 from rigdda.app.page import parts
+from rigdda.model import loose_blocks, site_names
 from rigdda.model.site_tables import Stretch
+
+INLINE = """
+name = "inline"
+description = ""
+sources = [{name = "rock", band = [3.0, 6.0]}]
+events = [{name = "block", rate = 1.0, volume = [0.1, 0.5]}]
+slope = {points = [[0, 60], [10, 50], [40, 5], [60, 0], [140, -1]], toe = 50.0}
+road = {start = 60.0, end = 68.0}
+barrier_zone.start = 12.0
+barrier_zone.end = 60.0
+surfaces.rock.ground = "hard_rock"
+surfaces.soil = {ground = "hard_soil"}
+"""
+"""A site file without headers of tables."""
+
+WITHOUT_EVENTS = [name for name in site_names.names() if "[[events]]" not in sites.text(name)]
+"""Built-in sites whose files leave their events out."""
 
 BLOCKS = """
 [[slope.surfaces]]
@@ -125,3 +143,85 @@ def test_events_that_a_file_leaves_out_are_written_first() -> None:
     assert len(more.events) == len(site.events) + 1 and more.events[0] == site.events[0]
     renamed = Site.parse(parts.renamed_event(text, site, 0, "stones"), "site.toml")
     assert renamed.events[0].name == "stones"
+
+
+@pytest.mark.parametrize("name", WITHOUT_EVENTS)
+@pytest.mark.parametrize("own", ["", "events = []\n"])
+def test_values_of_events_that_a_file_leaves_out_are_set(name, own) -> None:
+    text, site = own + sites.text(name), Site.load(name)
+    values = {
+        ("events", 0, "rate"): None,
+        ("events", 0, "return_period"): 4.0,
+        ("events", 0, "design"): True,
+        ("events", 0, "width"): 8.0,
+        ("events", 0, "source"): site.sources[-1].name,
+    }
+    (event,) = Site.parse(parts.with_values(text, site, values), "site.toml").events
+    assert (event.name, event.source) == (site.events[0].name, site.sources[-1].name)
+    assert (event.rate, event.design, event.width) == (0.25, True, 8.0)
+    road = parts.with_values(text, site, {("road", "end"): site.road.end + 0.5})
+    assert road.count("[[events]]") == 0
+    assert Site.parse(road, "site.toml").road.end == site.road.end + 0.5
+
+
+def test_some_built_in_sites_leave_their_events_out() -> None:
+    assert {"toppling", "ritchie-35"} <= set(WITHOUT_EVENTS)
+
+
+@pytest.mark.parametrize("name", sorted(set(site_names.names()) - {"toppling"}))
+def test_new_bands_lie_clear_of_existing_barriers(name) -> None:
+    text, site = sites.text(name), Site.load(name)
+    for number in range(1, 5):
+        text = parts.with_band(text, site)
+        more = Site.parse(text, "site.toml")
+        assert len(more.sources) == len(site.sources) + 1 and more.existing == site.existing
+        band, reach = more.sources[-1].band, loose_blocks.reach(more.sources[-1], more.events[-1])
+        assert site.slope.points[0][0] <= band[0] - reach
+        assert band[1] + reach < site.road.start
+        for barrier in site.existing_barriers:
+            start, end = barrier.works(site.profile)
+            assert band[1] + reach <= start or end <= band[0] - reach, number
+        site = more
+
+
+def test_a_slope_without_room_for_a_band_tells_it() -> None:
+    text, site = sites.text("ritchie-80"), Site.load("ritchie-80")
+    with pytest.raises(BadInput, match="make room for it"):
+        for _ in range(40):
+            text = parts.with_band(text, site)
+            site = Site.parse(text, "site.toml")
+
+
+@pytest.mark.parametrize("event", ["", '{name = "edged", source = "edged", rate = 0.1}'])
+def test_a_band_whose_blocks_have_edges_gets_an_event_without_sizes(event) -> None:
+    edged = '{name = "edged", band = [12.0, 14.0], edges = [0.5, 0.6, 0.7]}'
+    text = INLINE.replace("6.0]}]", f"6.0]}}, {edged}]").replace("0.5]}]", f"0.5]}}, {event}]")
+    site = Site.parse(text, "site.toml")
+    more = Site.parse(parts.with_band(text, site), "site.toml")
+    assert more.sources[-1].edges == (0.5, 0.6, 0.7)
+    new = more.events[-1]
+    rate = 0.1 if event else 1.0 / parts.PERIOD
+    assert (new.source, new.area, new.rate) == (more.sources[-1].name, None, rate)
+
+
+def test_parts_of_a_file_without_headers_are_added_and_removed() -> None:
+    site = Site.parse(INLINE, "site.toml")
+    text = parts.with_band(INLINE, site)
+    more = Site.parse(text, "site.toml")
+    assert [source.name for source in more.sources] == ["rock", "band"]
+    assert [event.source for event in more.events] == ["rock", "band"]
+    assert more.events[1].area == site.events[0].area
+    assert Site.parse(parts.without_source(text, more, 1), "site.toml") == site
+    text = parts.with_event(INLINE, site)
+    more = Site.parse(text, "site.toml")
+    assert [event.name for event in more.events] == ["block", "block 2"]
+    assert Site.parse(parts.without_event(text, more, 1), "site.toml") == site
+    text = parts.with_stretch(INLINE, site, "meadow", 20.0, 30.0)
+    more = Site.parse(text, "site.toml")
+    assert _ends(more) == [(20.0, 30.0, "meadow")]
+    assert more.surfaces == site.surfaces | {"meadow": more.surfaces["meadow"]}
+    assert more.surfaces["meadow"].ground == "meadow"
+    assert parts.without_stretch(text, more, 0).count("20.0") == 0
+    assert (
+        Site.parse(parts.renamed_source(INLINE, site, 0, "a"), "site.toml").events[0].source == "a"
+    )

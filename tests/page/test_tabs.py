@@ -160,6 +160,91 @@ def _wait(done, seconds=120.0):
         time.sleep(0.02)
 
 
+def _entered(tab, label, value):
+    """Enter a value in the first input of the tab Slope with a label."""
+    widgets = [
+        one.widget for row in tab._rows.values() for one in row.bound if hasattr(one, "widget")
+    ]
+    widget = next(one for one in widgets if one.label == label)
+    assert widget.value != value
+    widget.value = value
+
+
+@pytest.mark.parametrize("name", ["ritchie-35", "toppling", "quick"])
+def test_an_event_is_edited_whether_the_file_has_it_or_not(name, tmp_path):
+    from rigdda.app.page.slope_tab import SlopeTab
+
+    (tmp_path / "site.toml").write_text(sites.text(name), encoding="utf-8")
+    with Workspace(Project.open(tmp_path)) as workspace:
+        tab, before = SlopeTab(Host(workspace)), workspace.project.site
+        tab.show()
+        _entered(tab, "Return period on 100 metres [years]", 20.0)
+        _entered(tab, "Design event", not before.events[0].design)
+        _entered(tab, "The return period counts", "arrival")
+        event = workspace.project.site.events[0]
+        assert (event.rate, event.design) == (0.05, not before.events[0].design)
+        assert event.rate_of == "arrival"
+        assert (event.name, event.source, event.area) == (
+            before.events[0].name, before.events[0].source, before.events[0].area
+        )  # fmt: skip
+        for _ in range(3):
+            workspace.project.undo()
+        assert workspace.project.site == before
+
+
+def test_a_site_whose_rates_are_those_of_arrivals_is_shown_in_all_tabs(tmp_path):
+    from rigdda.app.page.barriers_tab import BarriersTab
+
+    text = sites.text("quick").replace('name = "block"', 'name = "block"\nrate_of = "arrival"')
+    (tmp_path / "site.toml").write_text(text, encoding="utf-8")
+    with Workspace(Project.open(tmp_path)) as workspace:
+        page = Host(workspace)
+        assert page.project.site.events[0].rate_of == "arrival"
+        falls, barriers = FallsTab(page), BarriersTab(page)
+        falls.show()
+        falls._more()
+        falls._release.join()
+        falls.tick()
+        falls._passed.join()
+        falls.tick()
+        assert "pass the collector" in falls._collector.object
+        barriers.show()
+        workspace.live.ask(page.project.site, page.project.layout)
+        _wait(lambda: workspace.live.figures is not None and workspace.live.figures.costs)
+        barriers.tick()
+        assert "rock arrives" in barriers._figures.object
+        assert barriers._rules.object == ""
+
+
+def test_figures_of_the_collector_do_not_depend_on_what_a_rate_counts():
+    import msgspec
+    from light_site import LIGHT as light
+
+    from rigdda.app.page.falls_tab import COLLECTED, Passed
+
+    events = tuple(msgspec.structs.replace(one, rate_of="arrival") for one in light.events)
+    found = []
+    for site in (light, msgspec.structs.replace(light, events=events)):
+        passed = Passed(site, (), "block", 40, float(site.road.start))
+        passed.join()
+        assert passed.fault == ""
+        found.append((repr(passed.rows), repr(passed.slope)))
+    assert found[0] == found[1]
+    assert {row["quantity"] for row in passed.rows} == set(COLLECTED)
+
+
+def test_layouts_that_meet_their_checks_are_found_whatever_a_rate_counts(tmp_path):
+    from rigdda import Ditch
+    from rigdda.app.page.decide_tab import DecideTab
+
+    text = sites.text("quick").replace('name = "block"', 'name = "block"\nrate_of = "arrival"')
+    (tmp_path / "site.toml").write_text(text, encoding="utf-8")
+    with Workspace(Project.open(tmp_path)) as workspace:
+        tab = DecideTab(Host(workspace))
+        assert tab._met(())
+        assert not tab._met((Ditch(500.0, 1.0, 3.0),))
+
+
 def test_a_description_that_is_entered_is_that_of_the_site(host):
     from panel.widgets import TextAreaInput
 

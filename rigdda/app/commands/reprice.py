@@ -62,7 +62,7 @@ def reprice(
 
     asked = job.other_targets(target, failure, target_risk)
     done = job.reprice(results, job.parse_all(settings), asked, max_cost)
-    files = (*reprice_report.REPRICE_FILES, *design_report.FRONTIER_FILES)
+    files = (*reprice_report.REPRICE_FILES, *design_report.FRONTIER_FILES, tables.RISKS)
     folder = folder_for(out, f"reprice-{results.resolve().name}", *files)
     if folder.resolve() == results.resolve():
         raise click.UsageError("--out is the folder of the design: name another folder")
@@ -71,8 +71,8 @@ def reprice(
     note_placeholders(len(done.placeholders))
     for change in done.changes:
         click.echo(reprice_report.changed(change))
-    line = findings.headline(reprice_report.answer(done))
-    (click.echo if line.startswith("Build") else finding)(f"{line}\n")
+    finding(findings.headline(reprice_report.answer(done)))
+    click.echo()
     show(tables.costs(done))
     chances = tables.chances(done)
     if chances is not None:

@@ -304,15 +304,19 @@ def _named(line: str, layout: Layout) -> str:
 
 
 def _rules(found: LiveFigures, bad: str) -> str:
-    """Return what forbids the layout, as a list."""
+    """Return what forbids the layout, as a list, and why there are no figures."""
     lines = [*found.broken, *([found.fault] if found.fault else [])]
-    if not lines:
-        return ""
     items = "".join(f"<li>{html.escape(_named(line, found.layout))}</li>" for line in lines)
-    return (
-        f"<div role='alert' style='color:{bad}'><b>This layout may not be built:</b>"
-        f"<ul style='margin:2px 0;padding-left:20px'>{items}</ul></div>"
-    )
+    listed = f"<ul style='margin:2px 0;padding-left:20px'>{items}</ul>"
+    out = _alert("This layout may not be built:", listed, bad) if lines else ""
+    if found.failure:
+        out += _alert("The figures cannot be computed:", html.escape(found.failure), bad)
+    return out
+
+
+def _alert(head: str, body: str, bad: str) -> str:
+    """Return a message in HTML about what is wrong."""
+    return f"<div role='alert' style='color:{bad}'><b>{head}</b> {body}</div>"
 
 
 def shown(value: float) -> str:
@@ -346,7 +350,8 @@ def alternatives_html(project: Project, live: Live) -> str:
 def _compared(found: LiveFigures | None) -> tuple[str, ...]:
     """Return the figures of an alternative in the table."""
     if found is None or found.costs is None:
-        told = "to be computed" if found is None or not found.fault else found.fault
+        told = "" if found is None else found.fault or found.failure
+        told = told or "to be computed"
         return (told, "", "", "", "")
     c = found.costs
     reach = max((row["reach"] for row in found.events), default=math.nan)
@@ -387,7 +392,7 @@ def figures_html(found: LiveFigures, bad: str, quiet: str) -> str:
         out += paragraph(
             f"The checks of the barriers follow after {CHECKED} releases of each event."
         )
-    return out
+    return out + "".join(paragraph(f"Rate of {note}.") for note in found.notes)
 
 
 def _money(found: LiveFigures) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

@@ -21,7 +21,7 @@ from rigdda.app.page.known_layout import MOST_BARRIERS
 from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.section import plain_axes
 from rigdda.app.page.theme import SERIES, TALL, WRAPPED
-from rigdda.envs import DesignProblem
+from rigdda.envs.siting import Rules
 from rigdda.fields import described
 from rigdda.ground.prices import Consequences, Prices
 
@@ -235,10 +235,9 @@ class DecideTab:
         if site != self._checked:
             self._checked, self._meets = site, {}
         if layout not in self._meets:
-            problem = DesignProblem(
-                site, checks="required", max_barriers=MOST_BARRIERS, kinds=placing.kinds_for(site)
-            )
-            self._meets[layout] = problem.fits(layout)
+            rules = Rules(site, site.barrier_zone, checks="required")
+            broken = rules.violations(layout, placing.kinds_for(site), MOST_BARRIERS)
+            self._meets[layout] = next(broken, None) is None
         return self._meets[layout]
 
     def _show_found(self) -> None:

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import tomlkit
+from tomlkit.container import OutOfOrderTableProxy
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import Comment, Null, Table
+from tomlkit.items import Array, Comment, InlineTable, Item, Null, Table
 
 from rigdda import BadInput
 from rigdda.app.value_origins import given
@@ -57,6 +58,9 @@ def with_values(text: str, values: Mapping[tuple[str | int, ...], Any]) -> str:
 def with_table(text: str, name: str, values: Mapping[str, Any]) -> str:
     """Return the text of a TOML file with another table at the end of a list of tables.
 
+    The table is written as the others are: under a header [[...]], or within the brackets of an
+    array.
+
     Raises
     ------
     BadInput
@@ -68,6 +72,9 @@ def with_table(text: str, name: str, values: Mapping[str, Any]) -> str:
         tables = document[name] = tomlkit.aot()
     if not isinstance(tables, list):
         raise BadInput(name, type(tables).__name__, "make it a list of tables, [[...]]")
+    if isinstance(tables, Array):
+        tables.append(_inline(values))
+        return tomlkit.dumps(document)
     table = tomlkit.table()
     table.update(values)
     table.add(tomlkit.nl())
@@ -79,9 +86,7 @@ def with_rows(text: str, path: Path, rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the text of a TOML file with another list of tables, one in a line, at a path."""
     found = tomlkit.array()
     for row in rows:
-        table = tomlkit.inline_table()
-        table.update(row)
-        found.append(table)
+        found.append(_inline(row))
     return with_value(text, path, found.multiline(bool(rows)))
 
 
@@ -94,9 +99,8 @@ def without(text: str, path: Path) -> str:
         If the text is not TOML, or there is nothing at the path.
     """
     document = _parsed(text)
-    parent = _inner(document, path, path[:-1])
     try:
-        del parent[path[-1]]
+        _remove(document, path)
     except (KeyError, IndexError, TOMLKitError):
         raise BadInput(dotted(path), None, "name something that the file has") from None
     return tomlkit.dumps(document)
@@ -112,22 +116,69 @@ def _parsed(text: str) -> Any:
 def _set(document: Any, path: Path, value: Any) -> None:
     """Set one value in a document, or remove it."""
     for end in range(1, len(path)):
-        if isinstance(path[end], str):
-            parent = _inner(document, path, path[: end - 1])
-            key = path[end - 1]
-            if isinstance(key, str) and key not in parent:
-                parent[key] = tomlkit.table()
+        parent, key = _inner(document, path, path[: end - 1]), path[end - 1]
+        if isinstance(path[end], str) and isinstance(key, str) and key not in parent:
+            _put(document, path[:end], {})
     parent, key = _inner(document, path, path[:-1]), path[-1]
-    if value is None:
-        if isinstance(key, str) and key in parent:
-            _mark(document, path, remove=True)
-            del parent[key]
-        return
+    if value is not None:
+        _put(document, path, value)
+        _mark(document, path)
+    elif isinstance(key, str) and key in parent:
+        _mark(document, path, remove=True)
+        _remove(document, path)
+
+
+def _put(document: Any, path: Path, value: Any) -> None:
+    """Put a value at a path; a table among dotted keys is written inline, without a header.
+
+    A header among dotted keys would make those after it part of its table. From a table whose parts
+    are apart in the file, an old list is removed first: its replacement would end up in one part
+    and discard the others.
+    """
+    parent, key = _inner(document, path, path[:-1]), path[-1]
+    if isinstance(value, Mapping) and _is_dotted(document, path[:-1]):
+        value = _inline(value)
+    scattered = isinstance(parent, OutOfOrderTableProxy) and isinstance(value, dict | list)
     try:
+        if scattered and key in parent:
+            del parent[key]
         parent[key] = value
     except (IndexError, KeyError, TypeError, TOMLKitError):
         raise BadInput(dotted(path), value, "name a place that the file has") from None
-    _mark(document, path)
+
+
+def _remove(document: Any, path: Path) -> None:
+    """Remove a key or an item; a table whose only key it was remains, without keys.
+
+    Raises
+    ------
+    KeyError, IndexError, TOMLKitError
+        If there is nothing at the path.
+    """
+    parent = _inner(document, path, path[:-1])
+    del parent[path[-1]]
+    if isinstance(parent, dict) and not parent and _is_dotted(document, path[:-1]):
+        _inner(document, path, path[:-2])[path[-2]] = _inline({})
+
+
+def _inline(values: Mapping[str, Any]) -> InlineTable:
+    """Return a table that is written in one line, {...}."""
+    table = tomlkit.inline_table()
+    table.update(values)
+    return table
+
+
+def _is_dotted(document: Any, path: Path) -> bool:
+    """Return whether the table at a path is written by dotted keys, such as road.start = 1.0."""
+    found, parts = False, [document]
+    for key in path:
+        if isinstance(key, int):
+            parts, found = [[one for part in parts for one in part][key]], False
+            continue
+        bodies = [part.value.body if isinstance(part, Item) else part.body for part in parts]
+        pairs = [(k, v) for body in bodies for k, v in body if k is not None and k.key == key]
+        parts, found = [v for _, v in pairs], any(k.is_dotted() for k, _ in pairs)
+    return found
 
 
 def _mark(document: Any, path: Path, remove: bool = False) -> None:

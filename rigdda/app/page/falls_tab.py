@@ -64,7 +64,8 @@ REACH = 0.015
 class Passed:
     """Passages at the collector and along the slope, computed by a thread.
 
-    They are those that `rigdda simulate` computes for the same releases.
+    They are those that `rigdda simulate` computes for the same releases. The figures are of one
+    event, so that they do not depend on its rate, which may be that of arrivals.
 
     Attributes
     ----------
@@ -99,8 +100,8 @@ class Passed:
             even = simulation_report.along(self.site).tolist()
             lines = sorted({*even, self.station})
             found: Passages = passages(self.site, self.layout, seeds, lines)
-            passing = Passing.of(self.site, self.layout, self.event, found)
-            self.rows = stations.summary(passing, [lines.index(self.station)])
+            passing = Passing(self.site, [self.event], np.ones(len(self.site.events)), found)
+            self.rows = stations.summary(passing, [lines.index(self.station)], names=COLLECTED)
             places = [lines.index(x) for x in even]
             self.slope = stations.summary(
                 passing, places, [self.event], ("energy", "velocity", "height_top")

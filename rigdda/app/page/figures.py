@@ -16,6 +16,7 @@ from rigdda.app.reports.study_report import StudiedLayout, StudyResults
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem
 from rigdda.envs.cost import Account, account, learn
+from rigdda.envs.siting import Rules
 
 
 def study_layouts(layout: Layout) -> dict[str, Layout]:
@@ -84,8 +85,8 @@ def results_of(site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Out
 
 def broken_rules(site: Site, layout: Layout) -> tuple[str, ...]:
     """Return the siting rules that a layout breaks, each with its reason."""
-    problem = DesignProblem(site, max_barriers=MOST_BARRIERS)
-    found = problem.place.violations(layout, tuple(KINDS), MOST_BARRIERS)
+    rules = Rules(site, site.barrier_zone)
+    found = rules.violations(layout, tuple(KINDS), MOST_BARRIERS)
     return tuple(dict.fromkeys(map(str, found)))
 
 

@@ -12,7 +12,7 @@ from bokeh.models import ColumnDataSource, HoverTool, Range1d
 from bokeh.plotting import figure
 
 from rigdda import BadInput, Site
-from rigdda.app.page import edits, ground
+from rigdda.app.page import ground
 from rigdda.app.page.barriers_tab import shown, ways
 from rigdda.app.page.falls import Fall, Release
 from rigdda.app.page.forms import Bound, button, heading, in_words, paragraph, table, text
@@ -374,11 +374,7 @@ class GroundTab:
         folder = self.page.workspace.fit_folder
         rows = ground.fit_rows(folder) if folder is not None else []
         values: dict[tuple[str | int, ...], Any] = {r.path: round(r.fitted, 6) for r in rows}
-        self.page.act(
-            lambda: self.project.change_site(
-                lambda old: edits.with_values(old, values), "wrote the fitted ground"
-            )
-        )
+        self.page.act(lambda: self.project.set_values(values, "wrote the fitted ground"))
 
 
 def _surface(path: str) -> str:

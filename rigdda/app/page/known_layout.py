@@ -38,6 +38,10 @@ class LiveFigures(NamedTuple):
     broken: tuple[str, ...] = ()
     """Siting rules that the layout breaks, with the reason."""
     fault: str = ""
-    """Why the layout cannot be simulated; empty if it can."""
+    """Why the layout cannot stand or has no price; empty if nothing is wrong with it."""
+    failure: str = ""
+    """Why the computing ended, if it is not for the layout; empty if it did not."""
+    notes: tuple[str, ...] = ()
+    """How the rates of events were converted from those of arrivals."""
     doing: str = ""
     """What is being computed; empty if nothing is."""

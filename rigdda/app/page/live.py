@@ -2,8 +2,9 @@
 
 A thread computes releases of the layout on the page, and of the slope without it, in rounds of more
 and more releases of each event. The figures are those of a study (`rigdda study`) of the same
-releases. When the layout or the site changes, the thread leaves what it does and begins anew. It
-imports `figures` and the problem of design, so that the page opens sooner.
+releases; like the command, the thread first converts rates of arrivals to those of releases. When
+the layout or the site changes, the thread leaves what it does and begins anew. It imports `figures`
+and the problem of design, so that the page opens sooner.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import time
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -20,6 +22,10 @@ import rigdda
 from rigdda import BadInput, Error, Layout, Site
 from rigdda.app.page.known_layout import LiveFigures, Outcomes
 from rigdda.app.page.loading import IMPORTING
+from rigdda.app.page.portions import FIRST, next_size
+
+if TYPE_CHECKING:
+    from rigdda.app.page.rates import Released
 
 ROUNDS = (10, 25, 50, 100, 200, 400, 800, 1600)
 """Numbers of releases of each event after each round."""
@@ -30,10 +36,6 @@ many releases."""
 
 CHECKED = 50
 """Releases of each event after which the barriers are checked."""
-
-CHUNK, PATIENCE = 4, 0.15
-"""Number of releases that are simulated together at first, and the time that those of one chunk may
-take [s]: a change of the layout waits for them."""
 
 MOST_KEPT = 24
 """Number of layouts whose outcomes are remembered."""
@@ -83,6 +85,7 @@ class Live:
         self.figures: LiveFigures | None = None
         self.revision = 0
         self._known = _Known()
+        self._released: tuple[Site, Released] | None = None
         self._ready: dict[Layout, LiveFigures] = {}
         self._ready_site: Site | None = None
         self._asked: tuple[Site, Layout, tuple[Layout, ...]] | None = None
@@ -141,10 +144,11 @@ class Live:
             try:
                 self._compute(site, layout, others, done)
             except Error as error:
-                self._show(done, LiveFigures(layout, 0, fault=str(error)))
+                self._show(done, LiveFigures(layout, 0, failure=str(error)))
             except Exception as error:  # the thread lives as long as the page
                 traceback.print_exc()
-                self._show(done, LiveFigures(layout, 0, fault=f"{type(error).__name__}: {error}"))
+                words = f"{type(error).__name__}: {error}"
+                self._show(done, LiveFigures(layout, 0, failure=words))
 
     def _show(self, generation: int, figures: LiveFigures) -> None:
         with self._wake:
@@ -166,7 +170,10 @@ class Live:
     def _compute(
         self, site: Site, layout: Layout, others: Sequence[Layout], generation: int
     ) -> None:
-        """Compute round after round until there is something else to do."""
+        """Compute round after round until there is something else to do.
+
+        `site` is that of the file; figures are of the one with the rates of releases.
+        """
         with IMPORTING:
             from rigdda.app.page import figures
 
@@ -179,24 +186,57 @@ class Live:
         except BadInput as bad:
             self._show(generation, shown._replace(fault=str(bad), doing=""))
             return
+        try:
+            released = self._release_rates(site, shown, generation)
+        except Error as error:
+            self._show(generation, shown._replace(failure=str(error), doing=""))
+            return
+        if released is None:
+            return
+        where, shown = released.site, shown._replace(notes=released.notes)
         layouts = figures.study_layouts(layout)
         for count in (n for n in ROUNDS if n <= self.most):
-            seen = {name: self._known.of(site, one) for name, one in layouts.items()}
-            for words in self._fill(site, layouts, seen, count):
+            seen = {name: self._known.of(where, one) for name, one in layouts.items()}
+            for words in self._fill(where, layouts, seen, count):
                 if self._left(generation):
                     return
                 self._show(generation, shown._replace(doing=words))
             short = {n: {e: o[:count] for e, o in of.items()} for n, of in seen.items()}
-            shown = figures.updated(figures.results_of(site, layouts, short), shown, count)
+            shown = figures.updated(figures.results_of(where, layouts, short), shown, count)
             if count >= CHECKED and shown.checks is None and not broken and layout:
                 self._show(generation, shown._replace(doing="checking the barriers"))
-                shown = shown._replace(checks=figures.checked(site, layout))
+                shown = shown._replace(checks=figures.checked(where, layout))
             self._show(generation, shown)
             if count == min(COMPARED, self.most):
-                self._compare(site, others, generation, count)
+                new = [one for one in others if self._lacks(site, one, count)]
+                self._compare(where, new, generation, count)
             if self._left(generation):
                 return
         self._show(generation, shown._replace(doing=""))
+
+    def _release_rates(self, site: Site, shown: LiveFigures, generation: int) -> Released | None:
+        """Return a site with the rates of releases, None if there is something else to do.
+
+        Raises
+        ------
+        Error
+            As `rates.released` does.
+        """
+        with IMPORTING:
+            from rigdda.app.page import rates
+
+        if self._released is None or self._released[0] != site:
+            for words in rates.simulate(site):
+                if self._left(generation):
+                    return None
+                self._show(generation, shown._replace(doing=words))
+            self._released = site, rates.released(site)
+        return self._released[1]
+
+    def _lacks(self, site: Site, layout: Layout, count: int) -> bool:
+        """Return whether there are no figures of a layout of so many releases of each event."""
+        known = self.known(site, layout)
+        return known is None or not (known.fault or known.releases >= count)
 
     def _compare(self, site: Site, others: Sequence[Layout], generation: int, count: int) -> None:
         """Compute the figures of other layouts, of so many releases of each event."""
@@ -204,9 +244,6 @@ class Live:
             from rigdda.app.page import figures
 
         for other in others:
-            known = self.known(site, other)
-            if known is not None and (known.fault or known.releases >= count):
-                continue
             layouts = figures.study_layouts(other)
             seen = {name: self._known.of(site, one) for name, one in layouts.items()}
             found = LiveFigures(other, 0)
@@ -233,12 +270,11 @@ class Live:
         for name in reversed(list(layouts)):
             for event in site.event_names:
                 own = seen[name][event]
-                step = CHUNK
+                size = FIRST
                 while len(own) < count:
-                    end = min(count, len(own) + step)
+                    end = min(count, len(own) + size)
                     jobs = [(site, layouts[name], k, event) for k in range(len(own), end)]
                     start = time.monotonic()
                     own += rigdda.release_many(jobs)
-                    quick = time.monotonic() - start < PATIENCE
-                    step = 2 * step if quick else max(1, step // 2)
+                    size = next_size(size, time.monotonic() - start)
                     yield f"{event}: {len(own):,} of {count:,} releases"

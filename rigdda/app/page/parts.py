@@ -6,25 +6,39 @@ Each function returns the text of a site file after the change. `Project.change_
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from itertools import pairwise
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import msgspec
 import tomlkit
 
-from rigdda import BadInput, Site
+from rigdda import BadInput, Site, fields
 from rigdda.app.page import edits
 from rigdda.ground.grounds import GROUNDS
-from rigdda.model.site_tables import Stretch
+from rigdda.model import loose_blocks
+from rigdda.model.site_tables import Event, Stretch
+from rigdda.model.source import Source
 from rigdda.rounding import chainage
 
 STRETCHES = ("slope", "surfaces")
 """Path of the stretches in a site file."""
 
 PERIOD, VOLUME = 10.0, (0.1, 1.0)
-"""Return period [years] and volumes [m3] of the event of a new band if the site has no band yet:
-placeholders that the user replaces."""
+"""Return period [years] and volumes [m3] of the event of a new band if no event comes from the band
+that it is like: placeholders that the user replaces."""
+
+LEAST_ROOM = 0.6
+"""Least length of the slope in which a new band is put, a third of which it covers [m]."""
+
+
+def with_values(text: str, site: Site, values: Mapping[tuple[str | int, ...], Any]) -> str:
+    """Return the text with other values at several paths, see `edits.with_values`.
+
+    Events that the file leaves out are written first if one of the values is theirs.
+    """
+    if any(path[0] == "events" for path in values):
+        text = _with_events(text, site)
+    return edits.with_values(text, values)
 
 
 def laid(stretches: Sequence[Stretch], new: Stretch) -> list[Stretch]:
@@ -81,30 +95,58 @@ def _with_stretches(text: str, stretches: Iterable[Stretch]) -> str:
 def with_band(text: str, site: Site) -> str:
     """Return the text with another source band and an event from it, both like the last ones.
 
-    The band lies in the middle of the longest part of the slope above its toe without a band.
+    The band lies in the middle of the longest part of the slope above its toe without a band and
+    without an existing barrier.
+
+    Raises
+    ------
+    BadInput
+        If there is no room for it.
     """
-    bands = [k for k, source in enumerate(site.sources) if source.band is not None]
     text = _with_events(text, site)
     name = _free("band", (source.name for source in site.sources))
-    source: dict[str, Any] = _table(text, "sources", bands[-1]) if bands else {}
-    source |= {"name": name, "band": list(_room_for_band(site))}
-    text = edits.with_table(text, "sources", source)
-    like = site.sources[bands[-1]].name if bands else None
-    alike = [k for k, one in enumerate(site.events) if one.source == like]
-    new = {"return_period": PERIOD, "volume": list(VOLUME)}
-    event: dict[str, Any] = _table(text, "events", alike[-1]) if alike else new
+    bands = [k for k, source in enumerate(site.sources) if source.band is not None]
+    like = site.sources[bands[-1]] if bands else Source(name, band=(0.0, 1.0))
+    alike = [k for k, event in enumerate(site.events) if bands and event.source == like.name]
+    source = _table(text, "sources", bands[-1]) if bands else {}
+    event = _table(text, "events", alike[-1]) if alike else _usual_event(like)
     event |= {"name": _free(f"block, {name}", site.event_names), "source": name}
-    return edits.with_table(text, "events", event)
+    reach = loose_blocks.reach(like, fields.read(Event, event, "events"))
+    source |= {"name": name, "band": list(_room_for_band(site, reach))}
+    return edits.with_table(edits.with_table(text, "sources", source), "events", event)
 
 
-def _room_for_band(site: Site) -> tuple[float, float]:
-    """Return the middle third of the longest part of the slope without a band [m]."""
-    first, last = site.slope.points[0][0], min(site.slope.toe, site.road.start)
-    ends = [first]
-    for low, high in sorted(s.band for s in site.sources if s.band is not None):
-        ends += [low, high]
-    gaps = list(pairwise([*ends, last]))[::2]
-    low, high = max(gaps, key=lambda gap: gap[1] - gap[0])
+def _usual_event(source: Source) -> dict[str, Any]:
+    """Return the values of an event of usual rate and volumes, unless its source gives their size.
+
+    The user replaces them.
+    """
+    sizes = {"volume": list(VOLUME)} if source.edges is None else {}
+    return {"return_period": PERIOD} | sizes
+
+
+def _room_for_band(site: Site, reach: float) -> tuple[float, float]:
+    """Return the middle third of the longest part of the slope where a band may lie [m].
+
+    Its blocks reach farther than the band on either side [m]: they must lie on the ground, uphill
+    of the road and clear of existing barriers.
+    """
+    first, last = site.slope.points[0][0] + reach, min(site.slope.toe, site.road.start - reach)
+    taken = [source.band for source in site.sources if source.band is not None]
+    for barrier in site.existing_barriers:
+        start, end = barrier.works(site.profile)
+        taken.append((start - reach, end + reach))
+    gaps, free = [], first
+    for low, high in sorted(taken):
+        gaps.append((free, min(low, last)))
+        free = max(free, high)
+    low, high = max([*gaps, (free, last)], key=lambda gap: gap[1] - gap[0])
+    if high - low < LEAST_ROOM:
+        hint = (
+            "make room for it: no part of the slope is free of bands and existing barriers where "
+            "its blocks can lie"
+        )
+        raise BadInput("new source band", None, hint)
     third = (high - low) / 3.0
     return round(low + third, 1), round(high - third, 1)
 
@@ -159,7 +201,7 @@ def renamed_event(text: str, site: Site, place: int, name: str) -> str:
 
 def _with_events(text: str, site: Site) -> str:
     """Return the text with the events of the site, which a file may leave out."""
-    if "events" in tomlkit.parse(text):
+    if tomlkit.parse(text).get("events"):
         return text
     for event in site.events:
         values = msgspec.to_builtins(event)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from rigdda import BadInput, Barrier, Ditch, Embankment, Fence, Layout, Mesh, Removal, Site
-from rigdda.app.page.section import outlines
+from rigdda.app.page.section import Floats, graded
 from rigdda.barriers import KINDS, from_table
 from rigdda.barriers.fence import FENCE_CLASSES
 from rigdda.envs.siting import FeasiblePlaces
@@ -101,7 +101,10 @@ def _rounded(place: FeasiblePlaces, barrier: Barrier) -> Barrier:
 
 
 def with_field(barrier: Barrier, field: str, value: Any) -> Barrier:
-    """Return a barrier with another value of a field; the height of a fence follows its class.
+    """Return a barrier with another value of a field.
+
+    The elongation of a fence of an energy class follows its class, and so does the range of its
+    height. A fence that is given by its capacity keeps its elongation.
 
     Raises
     ------
@@ -109,8 +112,8 @@ def with_field(barrier: Barrier, field: str, value: Any) -> Barrier:
         If the value is outside its range.
     """
     table = msgspec.to_builtins(barrier) | {field: value}
-    if isinstance(barrier, Fence):
-        table.pop("elongation", None)
+    if isinstance(barrier, Fence) and barrier.energy_class is not None:
+        table.pop("elongation")
         if field == "energy_class":
             row = FENCE_CLASSES[value]
             table["height"] = min(max(barrier.height, row.lowest), row.height)
@@ -125,8 +128,9 @@ def fields_of(barrier: Barrier) -> list[Described]:
 
 def grips(site: Site, layout: Layout) -> list[Grip]:
     """Return the handles of the barriers of a layout."""
-    drawn = {barrier: outline for barrier, outline, _ in outlines(site, layout)}
-    ground, left = site.profile, float(site.slope.points[0][0])
+    ground, standing = graded(site, layout)
+    drawn: dict[Barrier, Floats] = {barrier: outline for barrier, outline, _ in standing}
+    left = float(site.slope.points[0][0])
     right = float(site.slope.points[-1][0])
     found = []
     for i, barrier in enumerate(layout):

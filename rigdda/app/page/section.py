@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import groupby, pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from bokeh.events import PanStart
 from bokeh.models import ColumnDataSource, HoverTool, Range1d
 from bokeh.plotting import figure
+from numpy.typing import NDArray
 
 from rigdda import BadInput, Layout, Site
 from rigdda.app.page.locking import on_change
 from rigdda.app.page.theme import Theme
 from rigdda.app.reports.source_outlines import sources
-from rigdda.barriers import Earthwork, earthworks
+from rigdda.barriers import Built, Earthwork, earthworks
+from rigdda.ground.terrain import Terrain
 from rigdda.model.survey import spikes
+
+Floats = NDArray[np.float64]
 
 MARGIN = 0.06
 """Share of the length and the height of the ground that is free around it."""
@@ -137,7 +141,7 @@ class Section:
             )  # fmt: skip
 
     def show(self, site: Site, layout: Layout = ()) -> None:
-        """Draw a site and a layout; a barrier that cannot stand is left out."""
+        """Draw a site and a layout, see `graded`; a barrier that cannot stand is left out."""
         self._show_ground(site)
         ground = site.profile
         x = np.array(site.slope.points)[:, 0]
@@ -184,7 +188,7 @@ class Section:
 
     def _show_barriers(self, site: Site, layout: Layout) -> None:
         data: dict[str, list[Any]] = {"xs": [], "ys": [], "colour": [], "words": []}
-        for barrier, outline, words in outlines(site, layout):
+        for barrier, outline, words in graded(site, layout).barriers:
             data["xs"].append(outline[:, 0])
             data["ys"].append(outline[:, 1])
             data["colour"].append(self.theme.accent if barrier in layout else self.theme.quiet)
@@ -192,29 +196,47 @@ class Section:
         self._standing.data = data
 
 
-def outlines(site: Site, layout: Layout) -> list[tuple[Any, Any, str]]:
-    """Return the barriers that stand with a layout, each with its outline and its label.
+class Graded(NamedTuple):
+    """The slope with a layout, as simulations have it."""
 
-    A barrier that cannot stand where it is, or removes what is not there, is left out.
+    ground: Terrain
+    """The ground with the earthworks of the barriers."""
+    barriers: list[tuple[Built, Floats, str]]
+    """The barriers that stand, each with its outline and its label."""
+
+
+def graded(site: Site, layout: Layout) -> Graded:
+    """Return the slope with a layout and the existing barriers.
+
+    A barrier that cannot stand together with those before it is returned as it would stand alone,
+    and left out if it cannot stand alone either, or removes what is not there.
     """
-    try:
-        built = site.standing(layout)
-        labels = site.labels(layout)
-        _, moved = earthworks(site.profile, built, site.soil)
-    except BadInput:
-        if len(layout) > 1:
-            return [found for one in layout for found in outlines(site, (one,))]
-        return [] if not layout else outlines(site, ())
-    found = []
-    for barrier, words in zip(built, labels, strict=True):
-        try:
-            own = (
-                moved[barrier] if isinstance(barrier, Earthwork) else barrier.outline(site.profile)
-            )
-        except BadInput:
-            continue
-        found.append((barrier, own, words))
+    found = _graded(site, layout)
+    if found is not None:
+        return found
+    kept: Layout = ()
+    apart = []
+    for barrier in layout:
+        if _graded(site, (*kept, barrier)) is None:
+            apart.append(barrier)
+        else:
+            kept = (*kept, barrier)
+    found = _graded(site, kept) or Graded(site.profile, [])
+    for barrier in apart:
+        alone = _graded(site, (barrier,)) or Graded(site.profile, [])
+        found.barriers.extend(one for one in alone.barriers if one[0] == barrier)
     return found
+
+
+def _graded(site: Site, layout: Layout) -> Graded | None:
+    """Return the slope with a layout; None if a barrier of it cannot stand."""
+    try:
+        built, labels = site.standing(layout), site.labels(layout)
+        ground, moved = earthworks(site.profile, built, site.soil)
+        corners = [moved[b] if isinstance(b, Earthwork) else b.outline(ground) for b in built]
+    except BadInput:
+        return None
+    return Graded(ground, list(zip(built, corners, labels, strict=True)))
 
 
 def spanned(values: Sequence[float]) -> Range1d:

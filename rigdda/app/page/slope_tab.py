@@ -25,6 +25,7 @@ from rigdda.app.page.theme import TALL
 from rigdda.app.reports.wording import survey_grid
 from rigdda.app.value_origins import accepted
 from rigdda.ground.grounds import GROUNDS, Ground
+from rigdda.model.site_tables import ARRIVAL, RELEASE
 from rigdda.model.survey import spikes
 
 if TYPE_CHECKING:
@@ -40,6 +41,9 @@ MOST = 40
 
 WIDE = 430
 """Width of the forms [pixels]."""
+
+COUNTED = {"all releases of rock": RELEASE, "rock that reaches the road": ARRIVAL}
+"""What a return period counts, in words."""
 
 
 class SlopeTab:
@@ -416,11 +420,17 @@ class SlopeTab:
             partial(_design, self.project, i),
             self._set(("events", i, "design"), "design event"),
         )
-        self._bound += [source, period, design]
+        counted = choice(
+            "The return period counts", COUNTED,
+            partial(_value, self.project, ("events", i, "rate_of")),
+            self._set(("events", i, "rate_of"), "what a return period counts"), 230,
+        )  # fmt: skip
+        self._bound += [source, period, design, counted]
         rows = [
             pn.Row(name, self._remover(partial(self._remove_event, i), "this event")),
             source.widget,
             pn.Row(period.widget, design.widget),
+            counted.widget,
         ]
         return rows if place is None else rows + self._sizes(i, place)
 
@@ -483,7 +493,7 @@ class SlopeTab:
         self._change(values, "set the shape of blocks")
 
     def _change(self, values: dict[Path_, Any], words: str) -> None:
-        self._edit(lambda old: edits.with_values(old, values), words)
+        self.page.act(lambda: self.project.set_values(values, words))
 
     def _importer(self) -> Any:
         """Return the form that makes a site of a survey."""

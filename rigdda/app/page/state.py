@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ import msgspec
 import tomli_w
 
 from rigdda import BadInput, Error, Layout, Site, load_layout
-from rigdda.app.page import edits
+from rigdda.app.page import edits, parts
 from rigdda.barriers.layout import parse_layout, to_tables
 from rigdda.files import atomic, is_file, is_folder, read
 from rigdda.model import site_names
@@ -211,9 +211,11 @@ class Project:
 
     def set_value(self, path: edits.Path, value: object, words: str = "") -> None:
         """Set one value of the site file; None removes it. See `change_site`."""
-        self.change_site(
-            lambda text: edits.with_value(text, path, value), words or f"set {edits.dotted(path)}"
-        )
+        self.set_values({tuple(path): value}, words or f"set {edits.dotted(path)}")
+
+    def set_values(self, values: Mapping[tuple[str | int, ...], object], words: str) -> None:
+        """Set several values of the site file; None removes one. See `change_site`."""
+        self.change_site(lambda text: parts.with_values(text, self.site, values), words)
 
     def change_layout(self, layout: Layout, words: str) -> None:
         """Replace the layout; it may break siting rules.

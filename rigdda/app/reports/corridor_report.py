@@ -21,6 +21,7 @@ from rigdda.display import ROAD
 from rigdda.envs import Evaluation
 from rigdda.envs.corridor_problem import difference
 from rigdda.envs.intervals import Mean
+from rigdda.envs.problem import can_fail
 from rigdda.rounding import Rounding
 
 if TYPE_CHECKING:
@@ -173,12 +174,12 @@ def risk_columns(evaluation: Evaluation, site: rigdda.Site) -> dict[str, float |
 
     They are the probabilities that rock of a design event reaches the road and that a barrier fails
     in it, for the design event with the largest one-sided 95 % upper bound, and the individual risk
-    [1/year]. A number is None without design events, barriers or traffic.
+    [1/year]. A number is None without design events, barriers that can fail, or traffic.
     """
     out: dict[str, float | None] = {}
     for name, seen in (("reach", evaluation.reach), ("failure", evaluation.failure)):
         chances = [seen[event.name] for event in site.events if event.design]
-        if name == "failure" and not evaluation.layout:
+        if name == "failure" and not can_fail(site, evaluation.layout):
             chances = []
         greatest = worst(chances) if chances else None
         out[name] = greatest.probability if greatest and greatest.releases else None

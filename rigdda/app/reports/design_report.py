@@ -49,14 +49,15 @@ from rigdda.app.reports.tables import (
 )
 from rigdda.app.reports.wording import before, euros, percent, percentage, span, unchanged
 from rigdda.app.uncertainty.ground_band import Band
-from rigdda.barriers import describe, to_tables
+from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.design_envelope import DesignEnvelope
 from rigdda.envs.fence_checks import FenceCheck, demands
 from rigdda.envs.intervals import Estimate
-from rigdda.envs.problem import MET, MISSED, UNDECIDED
+from rigdda.envs.problem import MET, MISSED, UNDECIDED, can_fail
 from rigdda.envs.replay_record import release_record
 from rigdda.envs.ritchie_ditch import OUTSIDE_CHART
+from rigdda.files import remove_results
 from rigdda.replay.recording import Marks
 from rigdda.seeds import release_seeds
 
@@ -96,18 +97,25 @@ def layout_rows(done: DesignStudy) -> list[Row]:
 
     Z and its parts are in EUR per metre of road and year, `cost` is the price to build in EUR per
     metre, and `debris` is the volume on the road in m3 per metre and year; `debris_share` is that
-    volume divided by that of the first layout. `chosen` marks the layout found. `_low` and `_high`
-    are the ends of 95 % intervals.
+    volume divided by that of the first layout. `chosen` marks the layout found, and `comparable`
+    the layouts that may be proposed, which meet the required checks. `_low` and `_high` are the
+    ends of 95 % intervals.
     """
     site, whole = done.problem.site, done.nothing.evaluation.debris
     rows = [
-        {"layout": case.name, "chosen": case is done.chosen, **_costs(site, case.evaluation, whole)}
+        {
+            "layout": case.name,
+            "chosen": case is done.chosen,
+            **_costs(site, case.evaluation, whole),
+            "comparable": case in done.comparable,
+        }
         for case in done.cases
     ]
     shed = {name: 0.0 for name in rows[0] if name not in ("layout", "chosen")}
     known = ("objective", "objective_low", "objective_high", "capital")
     shed |= dict.fromkeys(known, site.shed()) | {"cost": site.prices.shed, "releases": 0}
-    return [*rows, {"layout": SHED, "chosen": False, **shed, "targets": "", "barriers": ""}]
+    words = {"targets": "", "barriers": "", "comparable": False}
+    return [*rows, {"layout": SHED, "chosen": False, **shed, **words}]
 
 
 def _costs(site: Site, e: Evaluation, whole: float) -> Row:
@@ -122,7 +130,7 @@ def _costs(site: Site, e: Evaluation, whole: float) -> Row:
         "debris_share": e.debris / whole if whole else math.nan,
         "targets": e.targets or "",
         "releases": e.releases,
-        "barriers": "; ".join(describe(barrier) for barrier in e.layout) or unchanged(site),
+        "barriers": findings.barriers_in_words(site, e.layout),
     }  # fmt: skip
 
 
@@ -137,13 +145,13 @@ def chance_rows(done: DesignStudy) -> list[Row]:
 
     `reach` is the probability that a block of a release reaches the road, `failure` that a barrier
     fails; `_low` and `_high` are the ends of 95 % intervals, and `_bound` is a one-sided 95 % upper
-    bound. `failure` is empty if no barrier stands. `cost` is the expected harm and repair of the
+    bound. `failure` is empty if no barrier can fail. `cost` is the expected harm and repair of the
     event in EUR per metre and year.
     """
     site = done.problem.site
 
     def failure(found: Evaluation, event: str) -> Estimate | None:
-        return found.failure[event] if site.standing(found.layout) else None
+        return found.failure[event] if can_fail(site, found.layout) else None
 
     return [
         {
@@ -180,6 +188,7 @@ def write_checks(done: DesignStudy, out: Path) -> None:
 
 CHECK_COLUMNS = (
     "barrier", "x_m", "check", "demand", "capacity", "unit", "use", "limit", "satisfied", "note",
+    "existing",
 )  # fmt: skip
 """Columns of the table of checks."""
 
@@ -197,6 +206,7 @@ def _check_row(check: BarrierCheck) -> dict[str, Any]:
         "limit": check.limit,
         "satisfied": check.satisfied,
         "note": check.note,
+        "existing": check.existing,
     }
 
 
@@ -319,28 +329,28 @@ FRONTIER_FILES = ("frontier.csv", "frontier.png")
 def write_frontier(folder: Path, problem: DesignProblem, front: Sequence[TriedLayout]) -> None:
     """Write the CSV file and the picture of a frontier, or remove old ones if it is empty."""
     if front:
-        write_rows(folder / FRONTIER_FILES[0], frontier_rows(front))
+        write_rows(folder / FRONTIER_FILES[0], frontier_rows(problem.site, front))
         draw_frontier(folder / FRONTIER_FILES[1], problem, front)
         return
-    for name in FRONTIER_FILES:
-        (folder / name).unlink(missing_ok=True)
+    remove_results(folder, FRONTIER_FILES)
 
 
-def frontier_rows(front: Sequence[TriedLayout]) -> list[dict[str, Any]]:
+def frontier_rows(site: Site, front: Sequence[TriedLayout]) -> list[dict[str, Any]]:
     """Return the rows of the CSV file: costs in EUR per metre, Z in EUR per metre and year.
 
-    `reach_bound` is the one-sided 95 % upper bound. Z is empty for a layout that is not verified.
+    `reach_bound` is the one-sided 95 % upper bound. The probability of a failure is empty if no
+    barrier can fail, and Z is empty for a layout that is not verified.
     """
     found = []
     for one in front:
-        z = one.verified
+        z, fallible = one.verified, can_fail(site, one.layout)
         found.append(
             {
                 "cost": one.cost,
                 "reach": one.reach.probability,
                 "reach_bound": one.level,
-                "failure": one.failure.probability,
-                "failure_bound": one.failure.bound,
+                "failure": one.failure.probability if fallible else math.nan,
+                "failure_bound": one.failure.bound if fallible else math.nan,
                 "releases": one.reach.releases,
                 "verified": z is not None,
                 "objective": z.objective if z else "",
@@ -357,7 +367,7 @@ def frontier_table(site: Site, front: Sequence[TriedLayout]) -> Table:
     out = empty_table(("layout", "to build", "reaches road", "fails", "Z", "of"))
     for one in front:
         z = euros(one.verified.objective) if one.verified else "not verified"
-        known = site.standing(one.layout) and one.failure.releases
+        known = can_fail(site, one.layout) and one.failure.releases
         fails = percent(one.failure.probability) if known else "-"
         count = f"{one.reach.releases:,}"
         out.add_row(brief(site, one.layout), euros(one.cost), bounded(one.reach), fails, z, count)
@@ -405,7 +415,10 @@ BAND_FILES = ("band.csv", "band.png")
 
 
 def band_rows(band: Band) -> list[dict[str, Any]]:
-    """Return one row for each ground and layout."""
+    """Return one row for each ground and layout.
+
+    The probability of a failure is empty if no barrier can fail.
+    """
     out = []
     for i, sample in enumerate(band.samples):
         for case in sample.cases:
@@ -415,7 +428,8 @@ def band_rows(band: Band) -> list[dict[str, Any]]:
             row |= {"capital": e.capital, "harm": e.harm, "repair": e.repair}
             for event in band.events:
                 row[f"P(reach) of {event}"] = e.reach[event].probability
-                row[f"P(failure) of {event}"] = e.failure[event].probability
+                failure = e.failure[event].probability if case.fallible else math.nan
+                row[f"P(failure) of {event}"] = failure
             chosen = case is sample.cases[-1]
             row |= {"releases": e.releases, "state": sample.state if chosen else ""}
             out.append(row)
@@ -459,24 +473,39 @@ def band_on_target(band: Band) -> str:
 
 
 def band_verdict(band: Band) -> str:
-    """Return a text that says whether the choice survives other grounds."""
-    count = len(band.samples)
-    best, undecided, costlier = (
-        round(count * band.share(state)) for state in ("cheapest", "undecided", "dearer")
-    )
-    words = f"on {best} of {count} grounds, the chosen layout is the cheapest of these"
-    if undecided:
+    """Return a text that says on how many grounds the chosen layout is the cheapest.
+
+    The choice survives if it is the cheapest on all of them, and it depends on the ground if it
+    misses the targets or costs more than another layout on some. Differences within the noise show
+    neither.
+    """
+    states = [sample.state for sample in band.samples]
+    count, missed = len(states), states.count("missed")
+    if missed == count:
+        words = f"on {count} of {count} grounds, the chosen layout misses the targets"
+        return f"{words}: costs are not compared"
+    asked = any(sample.targets is not None for sample in band.samples)
+    rest = "those that do not miss the targets" if asked else "these"
+    words = f"on {states.count('cheapest')} of {count} grounds, the chosen layout is the cheapest"
+    words += f" of {rest}"
+    if undecided := states.count("undecided"):
         words += f"; on {undecided}, another one is cheaper by no more than the noise"
-    if not costlier:
-        return f"{words}: the choice survives"
-    lost = [sample for sample in band.samples if sample.state == "dearer"]
-    rivals = dict.fromkeys(sample.cheapest.name for sample in lost)
-    named = " or ".join(repr(name) for name in rivals)
-    most = max(s.cases[-1].priced.objective - s.cheapest.priced.objective for s in lost)
-    return (
-        f"{words}; on {costlier}, {named} is cheaper by up to {euros(most)} EUR per metre and "
-        "year: the choice depends on the ground"
-    )
+    if missed:
+        words += f"; on {missed}, it misses the targets"
+    if lost := [sample for sample in band.samples if sample.state == "dearer"]:
+        rivals = dict.fromkeys(sample.cheapest.name for sample in lost)
+        named = " or ".join(repr(name) for name in rivals)
+        most = max(s.cases[-1].priced.objective - s.cheapest.priced.objective for s in lost)
+        words += f"; on {len(lost)}, {named} is cheaper by up to {euros(most)} EUR per metre and "
+        words += "year"
+    if missed or lost:
+        return f"{words}: the choice depends on the ground"
+    if undecided:
+        return (
+            f"{words}: these releases show neither that the choice survives nor that it depends on "
+            "the ground"
+        )
+    return f"{words}: the choice survives"
 
 
 def draw_band(path: Path, band: Band) -> None:

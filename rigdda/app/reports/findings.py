@@ -10,15 +10,31 @@ from itertools import groupby
 from typing import NamedTuple
 
 from rigdda import BadInput, Layout, Mesh, Site
+from rigdda.agents.designers import DEFAULT
 from rigdda.agents.designers.frontier import TriedLayout
 from rigdda.agents.designers.protocol import DesignResult
 from rigdda.app.barrier_checks import LayoutChecks
-from rigdda.app.design_study import ComparedLayouts, DesignStudy, design_events
-from rigdda.app.reports.wording import at_most, before, euros, order, percent, percentage, span
-from rigdda.barriers import KINDS
+from rigdda.app.design_study import (
+    CONSTANT,
+    ComparedLayouts,
+    DesignStudy,
+    VerifiedLayout,
+    design_events,
+)
+from rigdda.app.reports.wording import (
+    at_most,
+    before,
+    euros,
+    order,
+    percent,
+    percentage,
+    span,
+    unchanged,
+)
+from rigdda.barriers import KINDS, describe
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.barrier_formulas import BarrierCheck
-from rigdda.envs.problem import MET, MISSED, UNDECIDED, Targets
+from rigdda.envs.problem import MET, MISSED, UNDECIDED, Targets, can_fail
 from rigdda.envs.siting import FeasiblePlaces
 
 Money = tuple[float, float, float]
@@ -38,6 +54,27 @@ class FailedCheck(NamedTuple):
     barrier: str
     check: str
     use: float
+
+
+class OtherLayout(NamedTuple):
+    """A verified layout that a design may propose instead of the one that it found.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    barriers : str
+        Its barriers in words.
+    z : Money
+        Z with it.
+    targets : str or None
+        Whether it meets the targets; None without targets.
+    """
+
+    name: str
+    barriers: str
+    z: Money
+    targets: str | None
 
 
 class DesignAnswer(NamedTuple):
@@ -64,6 +101,12 @@ class DesignAnswer(NamedTuple):
         events, and the share of its releases that do [-].
     verified : bool
         Whether Z was computed from releases that no search used.
+    cap : float or None
+        Largest capital cost of a layout [EUR per metre of road]; None for no limit.
+    others : sequence of OtherLayout
+        The other verified layouts that may be proposed. The first is the case without a layout.
+    bare_targets : str or None
+        Whether the targets are met without the layout; None without targets.
     """
 
     layout: str
@@ -76,26 +119,46 @@ class DesignAnswer(NamedTuple):
     failed: Sequence[FailedCheck]
     reaching: tuple[str, float]
     verified: bool = True
+    cap: float | None = None
+    others: Sequence[OtherLayout] = ()
+    bare_targets: str | None = None
+
+    @property
+    def needed(self) -> bool:
+        """Whether the layout meets the targets and is needed for them."""
+        return self.targets == MET and self.bare_targets != MET
+
+
+HEADLINE_OPENINGS = (
+    "Build", "Compare with", "Do not build", "No layout that was found", "Verify with",
+)  # fmt: skip
+"""First words of `headline`, which begin no other finding."""
+
+
+def is_headline(line: str) -> bool:
+    """Return whether a finding is a first line of `headline`."""
+    return line.startswith(HEADLINE_OPENINGS)
 
 
 def headline(answer: DesignAnswer) -> str:
     """Return the first line of a design.
 
     A layout is never headed "build" if it fails one of its checks, misses a target, or costs more
-    than it saves without being needed for a target.
+    than it saves without being needed for a target. If another verified layout is better, this is
+    said instead.
     """
     layout = answer.layout
     fails = f" It fails its checks: {failed_words(answer.failed)}." if answer.failed else ""
+    within = "" if answer.cap is None else f" for at most {euros(answer.cap)} EUR per metre"
+    better = better_layout(answer)
+    if better is not None and (answer.targets == MISSED or not fails):
+        return f"{_comparison(answer, better)}{fails}"
     if answer.targets == MISSED:
-        if not layout:
-            return f"No layout that was found meets the target that {answer.asked}."
-        return (
-            f"No layout that was found meets the target that {answer.asked}. "
-            f"The best of those that miss it: {layout}.{fails}"
-        )
+        none = f"No layout that was found{within} meets the target that {answer.asked}."
+        return f"{none} The best of those that miss it: {layout}.{fails}" if layout else none
     if not layout and answer.targets == UNDECIDED:
         return (
-            f"Verify with more releases: no layout was shown to meet the target that "
+            f"Verify with more releases: no layout{within} was shown to meet the target that "
             f"{answer.asked}, and these releases do not decide whether the slope {answer.bare} "
             "meets it."
         )
@@ -103,7 +166,7 @@ def headline(answer: DesignAnswer) -> str:
         worth = "meets every check and is worth" if answer.required else "is worth"
         if answer.targets == MET:
             return f"Build nothing: the slope {answer.bare} meets the target."
-        return f"Build nothing: no layout was found that {worth} its cost."
+        return f"Build nothing: no layout was found{within} that {worth} its cost."
     if fails:
         return f"Do not build this as it is: {layout}.{fails}"
     if answer.targets not in (None, MET):
@@ -113,26 +176,64 @@ def headline(answer: DesignAnswer) -> str:
         )
     more = answer.z[0] - answer.nothing[0]
     if answer.z[1] > answer.nothing[2]:
-        if answer.targets == MET:
+        if answer.needed:
             return (
                 f"Build, for the target alone: {layout}. It costs {euros(more)} EUR per metre and "
                 f"year more than {answer.bare}.{_left(answer)}"
             )
         return (
-            f"Build nothing: the best layout that was found costs {euros(more)} EUR per metre and "
-            f"year more than {answer.bare}: {layout}."
+            f"Build nothing: the layout that was found{within} costs {euros(more)} EUR per metre "
+            f"and year more than {answer.bare}: {layout}."
         )
     if not answer.verified:
         return (
             f"Verify with a new design before you build: {layout}. Its Z is that of the releases "
             "by which it was chosen."
         )
-    if answer.z[2] >= answer.nothing[1] and answer.targets is None:
+    if answer.z[2] >= answer.nothing[1] and not answer.needed:
         return (
             f"Verify with more releases before you build: {layout}. It is not shown that it saves "
             "more than it costs."
         )
     return f"Build: {layout}.{_left(answer)}"
+
+
+TARGET_RANK = {None: 0, MET: 0, UNDECIDED: 1, MISSED: 2}
+"""Ranks of the states of targets, the best first."""
+
+
+def better_layout(answer: DesignAnswer) -> OtherLayout | None:
+    """Return the best of the other layouts that are better than the layout found, if any is.
+
+    If the layout found misses a target, or is no barrier and may miss one, a better layout is one
+    whose targets are in a better state. Otherwise, it is one whose targets are in no worse state
+    and that is shown to cost less. There is none if the best of these is the case without a layout
+    and its targets are in the same state.
+    """
+    rank = TARGET_RANK[answer.targets]
+    by_targets = rank == TARGET_RANK[MISSED] or (rank > 0 and not answer.layout)
+    if by_targets:
+        found = [one for one in answer.others if TARGET_RANK[one.targets] < rank]
+    else:
+        alike = [one for one in answer.others if TARGET_RANK[one.targets] <= rank]
+        found = [one for one in alike if one.z[2] < answer.z[1]]
+    best = min(found, key=lambda one: (TARGET_RANK[one.targets], one.z[0]), default=None)
+    if best is not None and best is answer.others[0] and TARGET_RANK[best.targets] == rank:
+        return None
+    return best
+
+
+def _comparison(answer: DesignAnswer, better: OtherLayout) -> str:
+    """Return a first line that names a better layout than the one found."""
+    this = f": {answer.layout}" if answer.layout else " nothing"
+    what = f"{better.name!r} costs {euros(answer.z[0] - better.z[0])} EUR per metre and year less"
+    if TARGET_RANK[better.targets] < TARGET_RANK[answer.targets]:
+        where = "with this layout" if answer.layout else answer.bare
+        what = (
+            f"The target that {answer.asked} is {answer.targets} {where} and {better.targets} with "
+            f"{better.name!r}"
+        )
+    return f"Compare with {better.name!r} before you build{this}. {what}: {better.barriers}."
 
 
 def _left(answer: DesignAnswer) -> str:
@@ -221,7 +322,12 @@ def worst(evaluation: Evaluation) -> str | None:
     return most if most is not None and left[most] > 0.0 else None
 
 
-def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: str) -> str:
+def limits(
+    result: DesignResult,
+    cases: Sequence[tuple[str, Evaluation]],
+    left: str,
+    searched: bool = True,
+) -> str:
     """Return one line that says what limits the result.
 
     Parameters
@@ -232,20 +338,18 @@ def limits(result: DesignResult, cases: Sequence[tuple[str, Evaluation]], left: 
         Verified layouts; the first is no barrier, and the last is the layout found.
     left : str
         Text on the remaining risk.
+    searched : bool
+        Whether the layout found was searched for, so that a larger budget may give a better one.
     """
     chosen = cases[-1][1]
     parts = [no_layout_pays(result.site, cases)]
-    parts += [_costs_less(name, other, cases[-1]) for name, other in cases[1:-1]]
+    parts += [_costs_less(name, other, cases[-1], searched) for name, other in cases[1:-1]]
     if chosen.layout and result.on_bound:
         parts.append(f"the layout lies on a bound of the search: {', '.join(result.on_bound)}")
     return "; ".join(filter(None, [*parts, left]))
 
 
-TARGET_RANK = {None: 0, MET: 0, UNDECIDED: 1, MISSED: 2}
-"""Ranks of the states of targets, the best first."""
-
-
-def _costs_less(name: str, other: Evaluation, best: tuple[str, Evaluation]) -> str:
+def _costs_less(name: str, other: Evaluation, best: tuple[str, Evaluation], searched: bool) -> str:
     """Return a text if a layout costs less per year than the last one; otherwise an empty text."""
     words, chosen = best
     if not other.ci[1] < chosen.ci[0]:
@@ -258,7 +362,9 @@ def _costs_less(name: str, other: Evaluation, best: tuple[str, Evaluation]) -> s
         )
     if TARGET_RANK[other.targets] == TARGET_RANK[MISSED]:
         return f"{line}, but also misses the targets"
-    return f"{line}: use a larger --budget"
+    if searched:
+        return f"{line}: use a larger --budget"
+    return f"{line}: choose {name!r}, or search with --designer {DEFAULT}"
 
 
 def no_layout_pays(site: Site, cases: Sequence[tuple[str, Evaluation]]) -> str:
@@ -386,17 +492,28 @@ def of_design(done: DesignStudy) -> list[str]:
     lines = [
         compliance(done),
         *for_comparison(done),
-        limits(done.result, cases, done.left),
+        limits(done.result, cases, done.left, was_searched(done)),
         *cheaper(cases),
+        *unreleased(done.problem.site, chosen),
         *failing(done.problem.site, chosen),
-        undecided(done.problem, chosen),
+        undecided(done.problem, chosen, "a larger --verify"),
     ]
     return [line for line in lines if line]
 
 
+def was_searched(done: DesignStudy) -> bool:
+    """Return whether the layout found was searched for; that of the rule or the constant is not."""
+    return done.chosen.name not in (done.rule.name, CONSTANT)
+
+
 def compliance(done: DesignStudy) -> str:
-    """Return a line on the cost of meeting all checks; empty if they are not required."""
-    if done.problem.checks != "required":
+    """Return a line on the cost of meeting all checks.
+
+    It is empty if they are not required, or if no layout was searched for. If the targets of the
+    layouts with and without required checks are in different states, the line does not say what the
+    checks cost, because a part of the difference is due to the targets.
+    """
+    if done.problem.checks != "required" or not was_searched(done):
         return ""
     other, chosen = done.unchecked, done.chosen.evaluation
     if other is None:
@@ -408,6 +525,16 @@ def compliance(done: DesignStudy) -> str:
         faults.append(f"has targets that are {free.targets}")
     built = " and ".join(f"{b.label} at x = {b.x:.1f} m" for b in free.layout) or "no barrier"
     but = f", which {' and '.join(faults)}" if faults else ""
+    found = f"without required checks, the search finds {built}{but}"
+    z = (
+        f"Z is {euros(chosen.objective)} ({span(chosen.ci)}) instead of {euros(free.objective)} "
+        f"({span(free.ci)})"
+    )
+    if free.targets != chosen.targets:
+        return (
+            f"{found}: {z}, but it is not known what meeting the checks costs, because the targets "
+            f"are {chosen.targets} with them and {free.targets} without them"
+        )
     more = f"{euros(chosen.objective - free.objective)} EUR per metre and year"
     cost = f"it is not shown that meeting the checks costs anything ({more})"
     if (apart := done.compliance) is not None:
@@ -415,11 +542,7 @@ def compliance(done: DesignStudy) -> str:
         cost = f"it is not shown that meeting the checks costs anything ({known})"
         if apart.ci[0] > 0.0:
             cost = f"meeting the checks costs {known}"
-    return (
-        f"without required checks, the search finds {built}{but}: {cost}, as Z is "
-        f"{euros(chosen.objective)} ({span(chosen.ci)}) instead of {euros(free.objective)} "
-        f"({span(free.ci)})"
-    )
+    return f"{found}: {cost}, as {z}"
 
 
 def for_comparison(done: DesignStudy) -> list[str]:
@@ -450,9 +573,10 @@ def in_words(failed: Sequence[BarrierCheck]) -> list[FailedCheck]:
 def reaching(evaluation: Evaluation, site: Site) -> tuple[str, float]:
     """Return the design event that most often reaches the road, and the share of its releases.
 
-    Without design events, the name is empty and the share 0.
+    Events without releases are left out. If there are no others, the name is empty and the share 0.
     """
-    shares = {name: evaluation.reach[name].probability for name in design_events(site)}
+    known = [name for name in design_events(site) if evaluation.reach[name].releases]
+    shares = {name: evaluation.reach[name].probability for name in known}
     most = max(shares, key=lambda name: shares[name], default="")
     return most, shares.get(most, 0.0)
 
@@ -470,7 +594,22 @@ def answer(done: DesignStudy) -> DesignAnswer:
         required=done.problem.checks == "required",
         failed=failed_checks(done.checks),
         reaching=reaching(chosen, site),
+        cap=done.problem.max_cost,
+        others=[_other(site, case) for case in done.comparable if case is not done.chosen],
+        bare_targets=nothing.targets,
     )
+
+
+def _other(site: Site, case: VerifiedLayout) -> OtherLayout:
+    """Return what the first line of a design needs of another layout than the one found."""
+    e = case.evaluation
+    words = barriers_in_words(site, e.layout)
+    return OtherLayout(case.name, words, (e.objective, *e.ci), e.targets)
+
+
+def barriers_in_words(site: Site, layout: Layout) -> str:
+    """Return the barriers of a layout in words, as in the table of layouts."""
+    return "; ".join(map(describe, layout)) or unchanged(site)
 
 
 def asked_words(targets: Targets) -> str:
@@ -504,10 +643,20 @@ def left_over(evaluation: Evaluation) -> str:
     return f"{words}; {euros(left[most])} of this is from the event {most!r}"
 
 
+def unreleased(site: Site, evaluation: Evaluation) -> list[str]:
+    """Return lines on the design events without releases, of which no probability is known."""
+    return [
+        f"no release of the design event {name!r} was drawn: it is not known how often it reaches "
+        "the road"
+        for name in design_events(site)
+        if not evaluation.reach[name].releases
+    ]
+
+
 def failing(site: Site, evaluation: Evaluation) -> list[str]:
     """Return lines on the failure of barriers in design events, if it may be above 5 %."""
     lines = []
-    for event in design_events(site) if site.standing(evaluation.layout) else ():
+    for event in design_events(site) if can_fail(site, evaluation.layout) else ():
         chance = evaluation.failure[event]
         if chance.releases and chance.bound > REPORTED_FAILURE:
             lines.append(
@@ -517,8 +666,18 @@ def failing(site: Site, evaluation: Evaluation) -> list[str]:
     return lines
 
 
-def undecided(problem: DesignProblem, evaluation: Evaluation) -> str:
-    """Return a text that says whether the targets are met; it is empty without targets."""
+def undecided(problem: DesignProblem, evaluation: Evaluation, remedy: str) -> str:
+    """Return a text that says whether the targets are met; it is empty without targets.
+
+    Parameters
+    ----------
+    problem : DesignProblem
+        The problem.
+    evaluation : Evaluation
+        Evaluation of the layout.
+    remedy : str
+        What would decide whether they are met.
+    """
     asked = problem.targets
     if evaluation.targets is None:
         return ""
@@ -527,5 +686,5 @@ def undecided(problem: DesignProblem, evaluation: Evaluation) -> str:
     parts = [f"{words} in every design event"] if words else []
     if asked.individual is not None:
         parts.append(f"individual risk <= {asked.individual:.6g} a year")
-    more = "; a larger --verify would decide it" if evaluation.targets == "undecided" else ""
+    more = f"; {remedy} would decide it" if evaluation.targets == UNDECIDED else ""
     return f"target {' and '.join(parts)}: {evaluation.targets}{more}"

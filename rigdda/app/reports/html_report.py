@@ -20,7 +20,7 @@ import rigdda
 from rigdda import BadInput, Site
 from rigdda.agents.run_record import RunRecord
 from rigdda.app.reports import findings
-from rigdda.app.reports.findings import DesignAnswer, FailedCheck, headline
+from rigdda.app.reports.findings import DesignAnswer, FailedCheck, Money, OtherLayout, headline
 from rigdda.app.reports.html_blocks import (
     FIELD,
     Block,
@@ -140,38 +140,54 @@ def _show(exhibit: Exhibit, folder: ResultsFolder, mark: str) -> Iterator[Block]
 def summary_section(folders: Folders) -> Iterator[Block]:
     """Yield the main result: what to build and what it saves, or the simulated rockfall."""
     designs = [folder for folder in folders if folder.files("layouts.csv", "design")]
+    answers = {folder.label: _repriced(folder) for folder in folders}
+    many = len(designs) + sum(line is not None for line in answers.values()) > 1
     for folder in designs:
-        yield from _titled([*_design_blocks(folder)], f"Design in {folder.label}", len(designs) > 1)
+        yield from _titled([*_design_blocks(folder)], f"Design in {folder.label}", many)
+    for label, line in answers.items():
+        if line is not None:
+            yield from _titled([_first_line(line)], f"Other values in {label}", many)
     passing = [block for f in folders if f.files("stations.csv") for block in _passing(f)]
     yield from _titled(passing, "What comes down", bool(designs))
     site = _site_of(folders)
     lines = [f"{line}" for folder in folders for line in _findings(folder, len(folders) > 1)]
-    if site is not None and designs:
+    if site is not None and (designs or any(answers.values())):
         lines += default_values(site)
     if lines:
         yield Heading("What limits this answer")
         yield Items(lines)
 
 
+def _repriced(folder: ResultsFolder) -> str | None:
+    """Return the answer that `rigdda reprice` printed, or None if it did not write the folder."""
+    record = folder.records.get("reprice")
+    lines = () if record is None else record.findings
+    return next((line for line in lines if findings.is_headline(line)), None)
+
+
 def _findings(folder: ResultsFolder, many: bool) -> Iterator[str]:
-    """Yield the findings of the commands in a folder, which they printed."""
+    """Yield the findings of the commands in a folder, which they printed.
+
+    The answer of `rigdda reprice` is left out, because it stands above them.
+    """
+    answer = _repriced(folder)
     for record in folder.records.values():
-        for line in record.findings:
+        for line in (line for line in record.findings if line != answer):
             text = line[0].upper() + line[1:] + ("" if line.endswith((".", "?", "!")) else ".")
             yield f"{folder.label}: {text}" if many else text
 
 
 def _design_blocks(folder: ResultsFolder) -> Iterator[Block]:
     """Yield what to build, where, what it costs and what it saves."""
-    _, rows = folder.table("layouts.csv", ("chosen", "objective_low", "objective_high"))
+    needed = ("chosen", "objective_low", "objective_high", "comparable")
+    _, rows = folder.table("layouts.csv", needed)
     chosen = next((row for row in rows if row["chosen"] == "True"), None)
     if chosen is None:
         hint = "no row is the chosen one: run the command that made it again"
         raise BadInput(FIELD, str(folder.path / "layouts.csv"), hint)
     site, targets = folder.site, chosen["targets"]
     layout = rigdda.load_layout(folder.path / "layout.toml")
-    line = headline(_answer(folder, chosen, rows[0]))
-    yield Paragraph(line, "answer" if line.startswith("Build") else "warning")
+    yield _first_line(headline(_answer(folder, chosen, rows)))
     if site is not None and site.existing:
         yield Items(findings.existing_barriers(site, layout))
     if targets == "met":
@@ -187,33 +203,60 @@ def _design_blocks(folder: ResultsFolder) -> Iterator[Block]:
     ])  # fmt: skip
 
 
-def _answer(folder: ResultsFolder, chosen: Row, nothing: Row) -> DesignAnswer:
-    """Return what the first line of a design needs, from its files."""
+def _first_line(line: str) -> Paragraph:
+    """Return the answer of a command as a paragraph that tells whether to build."""
+    return Paragraph(line, "answer" if line.startswith("Build") else "warning")
+
+
+def _answer(folder: ResultsFolder, chosen: Row, rows: Sequence[Row]) -> DesignAnswer:
+    """Return what the first line of a design needs, from its files.
+
+    `rows` are those of the table of layouts, of which one is `chosen`.
+    """
     site, options = folder.site, folder.records["design"].options
     layout = rigdda.load_layout(folder.path / "layout.toml")
     words = [order(barrier, site) if site is not None else barrier.label for barrier in layout]
-    _, rows = folder.table("checks.csv") if folder.files("checks.csv") else ([], [])
-    failed = [
+    return DesignAnswer(
+        layout="; ".join(words),
+        bare=before(site) if site is not None else "without barriers",
+        z=_ends(chosen),
+        nothing=_ends(rows[0]),
+        targets=chosen["targets"] or None,
+        asked=_asked(folder),
+        required=options.get("checks") == "required",
+        failed=_failed(folder),
+        reaching=_reaching(folder, chosen["layout"]),
+        cap=options.get("max_cost"),
+        others=[
+            OtherLayout(row["layout"], row["barriers"], _ends(row), row["targets"] or None)
+            for row in rows
+            if row["comparable"] == "True" and row is not chosen
+        ],
+        bare_targets=rows[0]["targets"] or None,
+    )
+
+
+def _failed(folder: ResultsFolder) -> list[FailedCheck]:
+    """Return the checks that the new barriers of a design do not meet.
+
+    Those of existing barriers do not count, as in `findings.failed_checks`.
+    """
+    needed = ("barrier", "x_m", "check", "use", "limit", "satisfied", "existing")
+    _, rows = folder.table("checks.csv", needed) if folder.files("checks.csv") else ([], [])
+    return [
         FailedCheck(
             f"{row['barrier']}, at {float(row['x_m']):.1f} m",
             row["check"],
             float(row["use"]) / float(row["limit"]),
         )
         for row in rows
-        if row["satisfied"] == "False"
+        if row["satisfied"] == "False" and row["existing"] == "False"
     ]
-    names = ("objective", "objective_low", "objective_high")
-    return DesignAnswer(
-        layout="; ".join(words),
-        bare=before(site) if site is not None else "without barriers",
-        z=(float(chosen[names[0]]), float(chosen[names[1]]), float(chosen[names[2]])),
-        nothing=(float(nothing[names[0]]), float(nothing[names[1]]), float(nothing[names[2]])),
-        targets=chosen["targets"] or None,
-        asked=_asked(folder),
-        required=options.get("checks") == "required",
-        failed=failed,
-        reaching=_reaching(folder, chosen["layout"]),
-    )
+
+
+def _ends(row: Row) -> Money:
+    """Return Z of a row with the ends of its interval."""
+    return float(row["objective"]), float(row["objective_low"]), float(row["objective_high"])
 
 
 def _asked(folder: ResultsFolder) -> str:
@@ -225,12 +268,15 @@ def _asked(folder: ResultsFolder) -> str:
 
 
 def _reaching(folder: ResultsFolder, layout: str) -> tuple[str, float]:
-    """Return the design event that most often reaches the road with a layout, and how often [-]."""
+    """Return the design event that most often reaches the road with a layout, and how often [-].
+
+    Events without releases are left out.
+    """
     _, rows = folder.table("chances.csv") if folder.files("chances.csv") else ([], [])
     own = {
         row["event"]: float(row["reach"])
         for row in rows
-        if row["layout"] == layout and row["design"] == "True"
+        if row["layout"] == layout and row["design"] == "True" and row["reach"]
     }
     most = max(own, key=lambda name: own[name], default="")
     return most, own.get(most, 0.0)
@@ -241,7 +287,7 @@ def _money_of(row: Row) -> str:
 
 
 def _ends_of(row: Row) -> str:
-    return span((float(row["objective_low"]), float(row["objective_high"])))
+    return span(_ends(row)[1:])
 
 
 def _individual(
@@ -260,15 +306,22 @@ def _individual(
 def _chances(
     folder: ResultsFolder, name: str, without: str, bare: str
 ) -> Iterator[tuple[str, str, str]]:
-    """Yield the probabilities of the design events with a layout, and without it."""
+    """Yield the probabilities of the design events with a layout, and without it.
+
+    An event without releases has none.
+    """
     _, rows = folder.table("chances.csv") if folder.files("chances.csv") else ([], [])
     for row in rows:
         if row["design"] == "True" and row["layout"] == name:
+            what = f"“{row['event']}” reaches the road"
+            if not row["reach"]:
+                yield what, "not known", "no release of this event was drawn"
+                continue
             earlier = next(r for r in rows if r["event"] == row["event"] and r["layout"] == without)
             reach, bound = float(row["reach"]), float(row["reach_bound"])
             rest = f"at most {at_most(bound)}; {bare} {percent(float(earlier['reach']))}"
-            yield f"“{row['event']}” reaches the road", percent(reach), rest
-            if name != without and row["failure"]:  # it is empty if no barrier stands
+            yield what, percent(reach), rest
+            if name != without and row["failure"]:  # it is empty if no barrier can fail
                 fails, bound = float(row["failure"]), float(row["failure_bound"])
                 yield f"A barrier fails in “{row['event']}”", percent(fails), (
                     f"at most {at_most(bound)}"

@@ -15,6 +15,7 @@ from rigdda.app.reports.tables import known_risks, write_risks, write_rows
 from rigdda.app.reports.wording import before, number, order
 from rigdda.app.reprice import BEST_OF_SEARCH, Change, Repriced
 from rigdda.envs import Evaluation
+from rigdda.envs.problem import can_fail
 
 REPRICE_FILES = ("costs.csv", "site.toml", "layout.toml", "cost.png")
 
@@ -34,7 +35,8 @@ def write(done: Repriced, folder: Path) -> None:
 def rows(done: Repriced) -> list[dict[str, Any]]:
     """Return one row for each layout; Z and its parts in EUR per metre of road and year.
 
-    Probabilities are those of the design event with the largest upper bound.
+    Probabilities are those of the design event with the largest upper bound. That of a failure is
+    empty if no barrier can fail.
     """
     return [_row(done, case.name, case.evaluation) for case in done.cases]
 
@@ -56,14 +58,14 @@ def _row(done: Repriced, name: str, e: Evaluation) -> dict[str, Any]:
         "meets_checks": not done.failed[name],
     }
     site = done.problem.site
-    stands = bool(site.standing(e.layout))
+    fallible = can_fail(site, e.layout)
     if any(event.design for event in site.events):
         one = TriedLayout.of(site, e)
         row |= {
             "reach": one.reach.probability,
             "reach_bound": one.level,
-            "failure": one.failure.probability if stands else math.nan,
-            "failure_bound": one.failure.bound if stands else math.nan,
+            "failure": one.failure.probability if fallible else math.nan,
+            "failure_bound": one.failure.bound if fallible else math.nan,
         }
     return row
 
@@ -89,6 +91,8 @@ def answer(done: Repriced) -> findings.DesignAnswer:
         failed=findings.in_words(done.failed[BEST_OF_SEARCH]),
         reaching=findings.reaching(chosen, site),
         verified=done.verified,
+        cap=done.problem.max_cost,
+        bare_targets=nothing.targets,
     )
 
 
@@ -117,7 +121,8 @@ def sentences(done: Repriced) -> list[str]:
     elif failing:
         lines.append(f"these layouts fail a check: {', '.join(map(repr, failing))}")
     lines.append(findings.no_layout_pays(done.problem.site, comparable))
-    lines += [*findings.failing(done.problem.site, chosen)]
-    lines.append(findings.undecided(done.problem, chosen))
+    lines += findings.unreleased(done.problem.site, chosen)
+    lines += findings.failing(done.problem.site, chosen)
+    lines.append(findings.undecided(done.problem, chosen, "a new design with a larger --verify"))
     lines.append(findings.left_over(chosen))
     return [line for line in lines if line]

@@ -25,6 +25,7 @@ from rigdda.app.reports.wording import euros, span
 from rigdda.envs.comparison import LEAST_PER_EVENT, Difference, difference_of_accounts
 from rigdda.envs.cost import Account, Facts, Risk, Sums, stratified
 from rigdda.envs.intervals import Estimate, estimate
+from rigdda.envs.problem import can_fail
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -152,8 +153,8 @@ def events(results: StudyResults) -> Table:
     out = empty_table(("event", "layout", "reaches road", "barrier fails", "on road", "hit"))
     for event in results.site.event_names:
         for i, one in enumerate(results.layouts):
-            stands = results.site.standing(one.layout)
-            fails = bounded(one.chance(event, failed=True)) if stands else "-"
+            fallible = can_fail(results.site, one.layout)
+            fails = bounded(one.chance(event, failed=True)) if fallible else "-"
             energies = [one.energy(event), one.energy(event, hit=True)]
             words = ["-" if np.isnan(e) else euros(e) for e in energies]
             reach = bounded(one.chance(event))
@@ -208,8 +209,8 @@ def event_rows(results: StudyResults) -> list[dict[str, Any]]:
     for one, name in itertools.product(results.layouts, results.site.event_names):
         row: dict[str, Any] = {"layout": one.name, "event": name}
         for words, failed in (("reach", False), ("failure", True)):
-            fallible = not failed or results.site.standing(one.layout)
-            row |= chance_columns(words, one.chance(name, failed) if fallible else None)
+            known = not failed or can_fail(results.site, one.layout)
+            row |= chance_columns(words, one.chance(name, failed) if known else None)
         row["energy_on_road_95"] = one.energy(name)
         row["energy_of_hit_95"] = one.energy(name, hit=True)
         row["harm_and_repair"] = results.sums(one).by_event[name]

@@ -37,6 +37,7 @@ from rigdda.app.reports.wording import (
 from rigdda.barriers import Earthwork, to_tables
 from rigdda.envs.cost import Risk
 from rigdda.envs.intervals import Estimate, Mean, estimate, mid_p, student_interval
+from rigdda.envs.problem import can_fail
 from rigdda.files import atomic
 from rigdda.rounding import between, chainage
 
@@ -342,7 +343,8 @@ def costs(study: ComparedLayouts) -> Table:
 def chances(study: ComparedLayouts) -> Table | None:
     """Return the table of probabilities in each design event, or None if the site has none.
 
-    Each probability is followed by its one-sided 95 % upper bound.
+    Each probability is followed by its one-sided 95 % upper bound. That of a failure is "-" if no
+    barrier can fail.
     """
     events = design_events(study.problem.site)
     if not events:
@@ -352,8 +354,8 @@ def chances(study: ComparedLayouts) -> Table | None:
         for i, case in enumerate(study.cases):
             e = case.evaluation
             reach = e.reach[event]
-            standing = study.problem.site.standing(e.layout)
-            fails = bounded(e.failure[event]) if standing else "-"
+            fallible = can_fail(study.problem.site, e.layout)
+            fails = bounded(e.failure[event]) if fallible else "-"
             name = "" if i else event
             table.add_row(name, case.name, bounded(reach), fails, f"{reach.releases:,}")
         table.add_section()
@@ -408,7 +410,7 @@ def known_risks(study: ComparedLayouts) -> list[tuple[str, Risk]]:
 def chance_columns(name: str, chance: Estimate | None) -> dict[str, float]:
     """Return a probability, the ends of its 95 % interval and its upper bound as columns.
 
-    They are empty without a probability, as that of a failure where no barrier stands.
+    They are empty without a probability, as that of a failure where no barrier can fail.
     """
     names = (name, f"{name}_low", f"{name}_high", f"{name}_bound")
     if chance is None:

@@ -9,7 +9,7 @@ are evaluated on the same releases.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -18,8 +18,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigdda import Layout, Site
-from rigdda.app.design_study import DesignStudy, design_events
+from rigdda import Site
+from rigdda.app.design_study import DesignStudy, VerifiedLayout, design_events
 from rigdda.app.uncertainty.parameters import (
     Input,
     Posterior,
@@ -29,7 +29,8 @@ from rigdda.app.uncertainty.parameters import (
 )
 from rigdda.app.uncertainty.varied_sites import Priced, SimulatedSite, noise, price, simulate
 from rigdda.envs import DesignProblem, Evaluation, ensemble
-from rigdda.envs.cost import Facts, judge
+from rigdda.envs.cost import judge
+from rigdda.envs.problem import MISSED, can_fail
 from rigdda.seeds import release_seeds
 
 Floats = NDArray[np.float64]
@@ -44,7 +45,7 @@ RELEASES_PER_GROUND = 120
 CLEAR_ERRORS = 1.96
 """Standard errors from which two values of Z on the same releases count as different [-]."""
 
-State = Literal["cheapest", "undecided", "dearer"]
+State = Literal["cheapest", "undecided", "dearer", "missed"]
 
 
 class BandLayout(NamedTuple):
@@ -60,12 +61,18 @@ class BandLayout(NamedTuple):
         Its cost in each release.
     comparable : bool
         Whether it may be chosen; not if it fails a required check.
+    fallible : bool
+        Whether one of the barriers that stand with it can fail.
+    targets : {"met", "missed", "undecided"} or None
+        Whether it meets the targets of the design on this ground; None if there are none.
     """
 
     name: str
     evaluation: Evaluation
     priced: Priced
     comparable: bool = True
+    fallible: bool = True
+    targets: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,28 +87,36 @@ class GroundSample:
         The layouts; the last one is the chosen layout.
     strata : (R,) array
         Event of each release.
-    targets : {"met", "missed", "undecided"} or None
-        Whether the chosen layout meets the targets of the design; None if there are none.
     """
 
     values: dict[str, float]
     cases: tuple[BandLayout, ...]
     strata: NDArray[np.int64]
-    targets: str | None
+
+    @property
+    def targets(self) -> str | None:
+        """Whether the chosen layout meets the targets of the design; None if there are none."""
+        return self.cases[-1].targets
 
     @property
     def cheapest(self) -> BandLayout:
-        """The layout with the least Z of those that may be chosen."""
-        own = [case for case in self.cases if case.comparable]
+        """The layout with the least Z of those that may be chosen and do not miss the targets.
+
+        The chosen layout must be one of them, see `state`.
+        """
+        own = [case for case in self.cases if case.comparable and case.targets != MISSED]
         return min(own, key=lambda case: case.priced.objective)
 
     @property
     def state(self) -> State:
         """Whether the chosen layout is the cheapest, costs more than another, or is undecided.
 
-        It is undecided if another layout is cheaper, but not by more than the noise of the
-        difference on the same releases.
+        It is compared with the layouts that do not miss the targets. It is undecided if one of them
+        is cheaper, but not by more than the noise of the difference on the same releases. If the
+        chosen layout misses the targets, the state is "missed", and costs are not compared.
         """
+        if self.targets == MISSED:
+            return "missed"
         chosen, best = self.cases[-1].priced, self.cheapest.priced
         if chosen.objective <= best.objective:
             return "cheapest"
@@ -130,10 +145,6 @@ class Band:
     releases: int
     source: str
     events: tuple[str, ...]
-
-    def share(self, state: State) -> float:
-        """Return the share of the grounds on which the chosen layout is in a state [-]."""
-        return sum(sample.state == state for sample in self.samples) / len(self.samples)
 
 
 def inputs(site: Site, posterior: Posterior | None) -> tuple[Input, ...]:
@@ -190,8 +201,7 @@ def assess(
     compared = [case for case in done.cases if case is not done.unchecked]
     comparable = {case.name for case in done.comparable}
     layouts = [case.evaluation.layout for case in compared]
-    seeds, facts = _seeds(problem, seed), ensemble.of(problem.site, problem.key).facts
-    samples = []
+    seeds, samples = _seeds(problem, seed), []
     for i, place in enumerate(cube):
         tick(i, f"ground {i + 1} of {grounds}")
         name = f"{problem.site.name}, ground {i + 1}"  # for warnings
@@ -201,11 +211,10 @@ def assess(
         pairs = zip(asked, place.tolist(), strict=True)
         values = {p: v for one, at in pairs for p, v in zip(one.paths, one.at(at), strict=True)}
         cases = tuple(
-            _case(case.name, site, layout, one, facts)._replace(comparable=case.name in comparable)
-            for case, layout, one in zip(compared, layouts, found, strict=True)
+            _case(problem, case, site, one)._replace(comparable=case.name in comparable)
+            for case, one in zip(compared, found, strict=True)
         )
-        chosen = cases[-1].evaluation
-        samples.append(GroundSample(values, cases, found[0].strata, problem.state(chosen)))
+        samples.append(GroundSample(values, cases, found[0].strata))
     source = "plausible range of the library of grounds" if posterior is None else "posterior"
     count = sum(map(len, seeds.values()))
     return Band(tuple(samples), count, source, design_events(problem.site))
@@ -223,8 +232,15 @@ def _seeds(problem: DesignProblem, seed: int) -> dict[str, Sequence[int]]:
 
 
 def _case(
-    name: str, site: Site, layout: Layout, found: SimulatedSite, facts: Mapping[str, Facts]
+    problem: DesignProblem, case: VerifiedLayout, site: Site, found: SimulatedSite
 ) -> BandLayout:
-    """Return a layout on one ground; `facts` are those of the site of the design."""
+    """Return a layout of the design `problem` on one ground, with which `site` was simulated."""
+    layout, facts = case.evaluation.layout, ensemble.of(problem.site, problem.key).facts
     evaluation = judge(site, layout, found.outcomes, facts, {})
-    return BandLayout(name, evaluation, price(site, layout, found))
+    return BandLayout(
+        name=case.name,
+        evaluation=evaluation,
+        priced=price(site, layout, found),
+        fallible=can_fail(site, layout),
+        targets=problem.state(evaluation),
+    )

@@ -103,8 +103,10 @@ def straight(band: tuple[float, float], road: float) -> Site:
 
 
 LONG_SIDE = Existing("embankment", 20.0, 2.0, width=1.0, side_slope=1.0)
-"""Its downhill side begins at x = 23, 3.5 m above the slope of 1:2, and meets it at x = 30. On level
-ground, it would end at x = 25."""
+"""Its downhill side begins at x = 23, 3.5 m above the slope of 1:2, and meets it at x = 30.
+
+On level ground, it would end at x = 25.
+"""
 
 
 def test_the_foot_of_an_old_embankment_stays_off_the_road() -> None:

@@ -59,7 +59,13 @@ releases takes as long as hundreds of others."""
 FRESH = 2
 """Seed of the releases of the comparison, which no search and no training draws."""
 
-FILES = ("training.json", "policy.safetensors")
+RECORD = "training.json"
+"""File with the terms of a training."""
+
+OF_TABLE = ("table", "table command")
+"""Terms that are known only with the table of forecasts: its digest and its command."""
+
+FILES = (RECORD, "policy.safetensors")
 """Files that a training writes into its folder besides those of the sites."""
 
 
@@ -122,7 +128,9 @@ def train(terms: Terms, out: Path, tick: Tick) -> Policy:
     """Train a policy, or continue an interrupted training; write it to `policy.safetensors`.
 
     Forecasts and outcomes of completed sites are kept. Learning takes seconds and is repeated.
-    Repeating a training gives the same file on the same machine.
+    Repeating a training gives the same file on the same machine. A training that is refused changes
+    nothing in the folder: the terms are checked first, and the digest of the table of forecasts
+    before the table is written.
 
     Raises
     ------
@@ -131,14 +139,22 @@ def train(terms: Terms, out: Path, tick: Tick) -> Policy:
     Diverged
         If a simulation diverges.
     """
+    network = hashlib.sha256(VALUE_NETWORK.read_bytes()).hexdigest()[:16]
+    versions = {"version": __version__, "mechanics": MECHANICS, "value network": network}
+    known = recorded_terms(out)
+    _agree(asdict(terms) | {"command": terms.command} | versions, known, out)
     table = table_of(terms, out, tick)
     digest = hashlib.sha256(table.z.tobytes() + table.features.tobytes()).hexdigest()[:16]
-    network = hashlib.sha256(VALUE_NETWORK.read_bytes()).hexdigest()[:16]
+    own = dict(zip(OF_TABLE, (digest, table.notes.get("command", "")), strict=True))
+    _agree(own, known, out)
     notes = {
         "command": terms.command, "version": __version__, "mechanics": MECHANICS,
-        "table": digest, "table command": table.notes.get("command", ""), "value network": network,
+        **own, "value network": network,
     }  # fmt: skip
-    _agree(asdict(terms) | notes, out)
+    with atomic(out / RECORD) as part:
+        part.write_bytes(msgspec.json.encode(asdict(terms) | notes))
+    if terms.sites:
+        table.save(out / "forecasts.safetensors")
     z = None
     if terms.simulate:
         folder = out / "sites"
@@ -151,6 +167,9 @@ def train(terms: Terms, out: Path, tick: Tick) -> Policy:
 
 def table_of(terms: Terms, out: Path, tick: Tick) -> ForecastTable:
     """Return the table of the package, or make one of the requested number of training sites.
+
+    The forecasts of each site are kept in the folder `sites`. The numbers are rounded as those of a
+    table that is read from a file.
 
     Raises
     ------
@@ -170,9 +189,7 @@ def table_of(terms: Terms, out: Path, tick: Tick) -> ForecastTable:
     z = np.array([own.z for own in found.values()])
     kept = forecasts.choose(z, catalogue, forecasts.LAYOUTS)
     notes = {"command": f"rigdda train --sites {terms.sites}"}
-    table = forecasts.table(found, catalogue, kept, notes)
-    table.save(out / "forecasts.safetensors")
-    return ForecastTable.load(out / "forecasts.safetensors")  # rounded as in the file
+    return forecasts.table(found, catalogue, kept, notes).rounded()
 
 
 def learn(
@@ -215,18 +232,33 @@ def learn(
     return pointer.export(members, bare.mean, bare.scale, notes)
 
 
-def _agree(asked: dict[str, Any], out: Path) -> None:
-    """Record the terms in the folder, or check that they are those of the training in it."""
-    file = out / "training.json"
-    if file.is_file():
-        try:
-            found = msgspec.json.decode(file.read_bytes(), type=dict[str, Any])
-        except msgspec.MsgspecError as error:
-            hint = f"remove the damaged training, or name another folder with --out ({error})"
-            raise BadInput("terms", str(file), hint) from None
+def recorded_terms(out: Path) -> dict[str, Any] | None:
+    """Return the terms of the training in a folder, or None if there is none.
+
+    Raises
+    ------
+    BadInput
+        If their file is damaged.
+    """
+    file = out / RECORD
+    if not file.is_file():
+        return None
+    try:
+        return msgspec.json.decode(file.read_bytes(), type=dict[str, Any])
+    except msgspec.MsgspecError as error:
+        hint = f"remove the damaged training, or name another folder with --out ({error})"
+        raise BadInput("terms", str(file), hint) from None
+
+
+def _agree(asked: dict[str, Any], known: dict[str, Any] | None, out: Path) -> None:
+    """Check that terms are those of the training in a folder, if there is one.
+
+    They are either the terms that are known before the table of forecasts, or those of the table.
+    """
+    if known is not None:
+        of_table = set(asked) == set(OF_TABLE)
+        found = {name: value for name, value in known.items() if (name in OF_TABLE) == of_table}
         check_terms(asked, found, f"the training in {out}")
-    with atomic(file) as part:
-        part.write_bytes(msgspec.json.encode(asked))
 
 
 def best_of_families(table: ForecastTable) -> dict[str, list[int]]:

@@ -49,7 +49,7 @@ def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:
     Raises
     ------
     BadInput
-        If a keyword is invalid.
+        If a keyword is invalid, or the environment is not one of this package.
     """
     from rigdda.envs import sb3
 

@@ -40,7 +40,7 @@ from rigdda.envs.problem import DesignProblem
 from rigdda.envs.recorder import Trigger
 from rigdda.envs.rendering import picture
 from rigdda.envs.replay_record import release_record
-from rigdda.envs.site_sampling import EpisodeSites, Place, Places, drawn_from
+from rigdda.envs.site_sampling import EpisodeSites, Place, Places, check_offered, drawn_from
 from rigdda.model.corridor import is_corridor
 from rigdda.model.corridor import names as corridor_names
 from rigdda.seeds import episode_seeds
@@ -48,8 +48,9 @@ from rigdda.seeds import episode_seeds
 DEFAULT_SECTIONS = 12
 """Default number of sections of an episode."""
 
-BUDGET_ROUNDING = 1e-9
-"""Relative excess of a budget that is attributed to rounding [-]."""
+BUDGET_ROUNDING = 1e-6
+"""Relative excess of a budget that is attributed to rounding [-]. Actions are rounded to float32. A
+layout which costs what is left may therefore decode to one that is dearer by some parts in 10^7."""
 
 MOST_SECTIONS = 1_000
 """Maximum number of sections of an episode."""
@@ -59,6 +60,9 @@ BUDGETS = (30.0, 1600.0)
 
 LENGTHS = (50.0, 300.0)
 """Range of the lengths of sections [m]."""
+
+LENGTH_DECIMALS = 1
+"""Number of decimals to which the lengths of sections are rounded [m]."""
 
 CORRIDOR_FIELDS: dict[str, observation.Field] = {
     "length": observation.Field(1, 2.1, 0.25, "log10 of the length of the section [m]"),
@@ -133,7 +137,7 @@ class CorridorDesign(LayoutEnv):
         Budget per metre of road [EUR/m], or the range from which its logarithm is drawn. By default
         `BUDGETS`, or, for a corridor, one of its budgets.
     lengths : (float, float)
-        Range of the lengths of sections [m].
+        Range of the lengths of sections, at least 0.1 m [m]. Lengths are rounded to 0.1 m.
     max_barriers, kinds, releases, fidelity, flat, render_mode
         See `BarrierDesign`; `releases` is the number in each section.
     record : path, optional
@@ -177,6 +181,8 @@ class CorridorDesign(LayoutEnv):
         self._corridor, self._names = _places(site)
         first = self._corridor.sections[0].site if self._corridor else self._names[0]
         self._sites = EpisodeSites([first], max_barriers, kinds, fidelity)
+        places = [s.site for s in self._corridor.sections] if self._corridor else self._names
+        check_offered(places, self._sites.slots.kinds)
         most = len(self._corridor.sections) if self._corridor else len(self._names)
         usual = most if self._corridor else min(DEFAULT_SECTIONS, most)
         self.sections = check.integer(
@@ -185,8 +191,8 @@ class CorridorDesign(LayoutEnv):
         if self._corridor and self.sections < most:
             raise BadInput("sections", sections, f"leave it out: the corridor has {most} sections")
         given = BUDGETS if budget is None and self._corridor is None else budget
-        self._budget = None if given is None else _range("budget", given)
-        self._lengths = _range("lengths", lengths)
+        self._budget = None if given is None else _range("budget", given, zero=True)
+        self._lengths = _lengths(lengths)
         slots = self._sites.slots
         own = {
             name: spaces.Box(-observation.BOUND, observation.BOUND, (f.size,), np.float32)
@@ -249,7 +255,7 @@ class CorridorDesign(LayoutEnv):
         total = math.fsum(section.length for section in self.placed)
         given: Any = (options or {}).get("budget")
         if given is not None:
-            low, high = _range("budget", given)
+            low, high = _range("budget", given, zero=True)
         elif self._budget is None:
             assert self._corridor is not None
             low = high = self._corridor.budgets[int(rng.integers(len(self._corridor.budgets)))]
@@ -272,7 +278,8 @@ class CorridorDesign(LayoutEnv):
                 PlacedSection(self._sites.problem_of(r.site), r.length, r.name) for r in rows
             )
         chosen = rng.choice(len(self._names), self.sections, replace=False).tolist()
-        lengths = np.round(rng.uniform(*self._lengths, size=self.sections), 1).tolist()
+        drawn = rng.uniform(*self._lengths, size=self.sections)
+        lengths = np.round(drawn, LENGTH_DECIMALS).tolist()
         problems = [self._sites.problem_of(self._names[i]) for i in chosen]
         return tuple(
             PlacedSection(problem, length, problem.site.name)
@@ -469,10 +476,19 @@ def _places(site: Any) -> tuple[Corridor | None, tuple[Place, ...]]:
     return None, drawn or (site,)
 
 
-def _range(field: str, value: Any) -> tuple[float, float]:
-    """Return a range of positive numbers given as a pair or as one number."""
+def _lengths(value: Any) -> tuple[float, float]:
+    """Return the range of the lengths of sections, of which no draw is rounded to 0."""
+    low, high = _range("lengths", value)
+    if np.round(low, LENGTH_DECIMALS) == 0.0:
+        hint = "give a number, or two numbers [low, high], of at least 0.1 m"
+        raise BadInput("lengths", value, hint)
+    return low, high
+
+
+def _range(field: str, value: Any, zero: bool = False) -> tuple[float, float]:
+    """Return a range of positive numbers given as a pair or as one number, which may be `zero`."""
     if isinstance(value, int | float | np.number):
-        number = check.number(field, value, 0.0, 1e9)
+        number = check.number(field, value, 0.0, 1e9, open_low=not zero)
         return number, number
     try:
         low, high = check.interval(field, value, 0.0, 1e9)

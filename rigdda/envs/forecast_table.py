@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -113,6 +113,11 @@ class ForecastTable:
                 hint += "or a split, or make a table with `rigdda train --sites N`"
                 raise BadInput("site", name, hint)
         return np.array([place[name] for name in given])
+
+    def rounded(self) -> ForecastTable:
+        """Return the table with the features in half precision, as `load` reads it from a file."""
+        features = self.features.astype(np.float16).astype(np.float32)
+        return replace(self, features=features)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the table to a safetensors file, with the features in half precision."""

@@ -44,7 +44,7 @@ def repeat(record: EpisodeRecord | ReleaseRecord) -> Repetition:
 
 def _repeat_episode(record: EpisodeRecord) -> Repetition:
     env = _environment(record)
-    env.draw(record.seed, {"site": record.site})
+    env.draw(record.seed)
     env.seeds = tuple(record.release_seeds)
     env.begin()
     rewards = [env.step(np.array(action))[1] for action in record.actions]
@@ -57,10 +57,14 @@ def _repeat_episode(record: EpisodeRecord) -> Repetition:
 
 
 def _environment(record: EpisodeRecord) -> environments.BarrierEnv:
-    """Return an environment with the keywords of a record; its site is set on `draw`."""
+    """Return an environment with the keywords of a record, whose episodes are on its site.
+
+    The site is given as a sequence, because the kinds of a record may be those of a split, of which
+    the site offers only some.
+    """
     name = ENVIRONMENTS[record.environment][0].rpartition(":")[2]
     made: environments.BarrierEnv = getattr(environments, name)(
-        "random",
+        [record.site],
         max_barriers=record.max_barriers,
         kinds=tuple(record.kinds),
         releases=record.releases,

@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
 from rigdda import BadInput
 from rigdda.envs.forecast_environment import BarrierForecastVector
+from rigdda.envs.registration import ENVIRONMENTS, FORECAST
 from rigdda.envs.vector import BarrierVector, stacked
 
 
@@ -202,5 +203,8 @@ def sb3_vec_env(id: str, num_envs: int, **keywords: Any) -> VecEnv:
     )
     if isinstance(batch, BarrierForecastVector):
         return VecMonitor(ForecastBridge(batch))
-    assert isinstance(batch, BarrierVector)
+    if not isinstance(batch, BarrierVector):
+        batch.close()
+        names = ", ".join((*ENVIRONMENTS, *FORECAST))
+        raise BadInput("id", id, f"name an environment of this package: {names}")
     return VecMonitor(Bridge(batch))

@@ -19,6 +19,7 @@ from rigdda.envs.encoding import SLOT_NUMBERS, Floats, built_and_dropped, encode
 from rigdda.envs.problem import (
     CHECKS,
     FIDELITIES,
+    MOST_BARRIERS,
     DesignProblem,
     Targets,
     checked_cost,
@@ -74,9 +75,7 @@ class Slots:
 
     def shared(self, site: Site) -> tuple[str, ...]:
         """Return the kinds available on a site; all kinds if none would be left."""
-        lacks = {*(() if site.meshes else (MESH,)), *(() if site.removals else (REMOVAL,))}
-        offered = tuple(kind for kind in self.kinds if kind not in lacks)
-        return offered or self.kinds
+        return offered(site, self.kinds) or self.kinds
 
     def decode(self, problem: DesignProblem, numbers: Floats) -> Layout:
         """Return the layout of the first slots; the others are empty."""
@@ -110,6 +109,31 @@ class Slots:
         """Return the columns of a slot that a problem with these kinds uses."""
         scores = [SLOT_NUMBERS + self.kinds.index(kind) for kind in kinds]
         return [*range(SLOT_NUMBERS), *(scores if len(kinds) > 1 else [])]
+
+
+def offered(site: Site, kinds: Sequence[str]) -> tuple[str, ...]:
+    """Return those of some kinds that a site offers."""
+    lacks = {*(() if site.meshes else (MESH,)), *(() if site.removals else (REMOVAL,))}
+    return tuple(kind for kind in kinds if kind not in lacks)
+
+
+def check_offered(places: Sequence[Place], kinds: Sequence[str]) -> None:
+    """Check that every site offers at least one of some kinds.
+
+    Sites are only loaded if there are no other kinds than those that some sites lack.
+
+    Raises
+    ------
+    BadInput
+        If a site offers none of them.
+    """
+    if not set(kinds) <= {MESH, REMOVAL}:
+        return
+    for place in places:
+        site = place if isinstance(place, Site) else Site.load(place)
+        if not offered(site, kinds):
+            hint = f"add a kind that every site offers: {site.name} offers no {' or '.join(kinds)}"
+            raise BadInput("kinds", kinds, hint)
 
 
 def named(kinds: Sequence[str]) -> tuple[str, ...]:
@@ -171,9 +195,10 @@ def problem_of(
     BadInput
         As `DesignProblem` does.
     """
+    count = check.integer("max_barriers", slots, 1, MOST_BARRIERS)  # 3.0 would find 3 in the cache
     if isinstance(site, str) and not os.path.exists(site) and isinstance(kinds, tuple | None):
-        return _named(site, slots, kinds, fidelity, targets, max_cost, checks)
-    return DesignProblem(site, slots, kinds, targets, fidelity, None, max_cost, checks)
+        return _named(site, count, kinds, fidelity, targets, max_cost, checks)
+    return DesignProblem(site, count, kinds, targets, fidelity, None, max_cost, checks)
 
 
 @lru_cache(MOST_PROBLEMS)
@@ -212,7 +237,7 @@ class EpisodeSites:
     Raises
     ------
     BadInput
-        As `DesignProblem` does.
+        As `DesignProblem` does, and if a site that may be drawn offers none of the kinds.
     """
 
     def __init__(
@@ -233,7 +258,9 @@ class EpisodeSites:
         if self._drawn:
             self.slots = Slots(named(SAMPLED_KINDS if kinds is None else kinds), max_barriers)
             self.first = self.problem_of(self._drawn[0])
-            if not isinstance(site, str):
+            if isinstance(site, str):
+                check_offered(self._drawn, self.slots.kinds)
+            else:
                 self._check(self._drawn[1:])
         else:
             assert isinstance(site, str | os.PathLike | Site)
@@ -257,20 +284,14 @@ class EpisodeSites:
             except BadInput as bad:
                 raise BadInput(f"site[{i}].{bad.field}", bad.value, bad.hint) from None
 
-    def change(self, site: Places) -> None:
-        """Change the site, split or sequence from the next episode on."""
-        self.home, self._drawn = None, drawn_from(site)
-        if not self._drawn:
-            assert isinstance(site, str | os.PathLike | Site)
-            self.home = self.problem_of(site)
-
     def draw(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> DesignProblem:
         """Return the problem of an episode; `options` may specify its site.
 
         Raises
         ------
         BadInput
-            If there is no such site, or `options` has other keys.
+            If there is no such site, one that may be drawn offers none of the kinds, or `options`
+            has other keys.
         """
         if options is not None and not isinstance(options, Mapping):
             raise BadInput("options", options, "give a mapping, such as {'site': 'quick'}")
@@ -281,4 +302,6 @@ class EpisodeSites:
         if site is None and self.home is not None:
             return self.home
         names = self._drawn if site is None else drawn_from(site)
+        if site is not None:
+            check_offered(names, self.slots.kinds)
         return self.problem_of(names[int(rng.integers(len(names)))] if names else site)

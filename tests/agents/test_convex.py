@@ -36,7 +36,7 @@ def least_by_trying_all(table: Catalogue, slots: int, cost: float) -> float:
                 continue
             left = np.maximum(table.base - table.relief[:, list(chosen)].sum(axis=1), 0.0)
             best = min(best, table.annual[list(chosen)].sum() + table.weight @ left)
-    return best
+    return table.standing + best
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -51,6 +51,7 @@ def test_the_programme_finds_the_best_choice(seed: int) -> None:
         annual=rng.uniform(10.0, 1000.0, 7),
         capital=rng.uniform(300.0, 1500.0, 7),
         span=np.array([[at, at + 0.2] for at in x]),
+        standing=250.0,
     )
     for slots, cost in ((1, None), (2, None), (3, None), (2, 2_000.0), (3, 1_200.0)):
         choice = choose(table, slots, max_cost=cost)
@@ -64,9 +65,12 @@ def test_where_nothing_helps_nothing_is_built() -> None:
     barrier = Fence(10.0, 1.0, energy_class=100)
     weight, base = np.ones(4), np.full(4, 0.3)
     span = np.array([[10.0, 10.2]])
-    table = Catalogue([barrier], weight, base, np.zeros((4, 1)), np.ones(1), np.ones(1), span)
-    assert choose(table, 2).layout == ()
-    assert choose(table.take([]), 2).layout == ()
+    none = np.zeros((4, 1))
+    table = Catalogue([barrier], weight, base, none, np.ones(1), np.ones(1), span, standing=5.0)
+    for own in (table, table.take([])):
+        choice = choose(own, 2)
+        assert choice.layout == ()
+        assert (choice.objective, choice.bound) == pytest.approx((6.2, 6.2))
 
 
 def looked(energy: list[float], speed: float = 10.0, width: float = 1.0) -> CrossingEnsemble:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 from valley import SITE, Barren, Valley
 
-from rigdda import Ditch, Fence, GravityWall, Site
-from rigdda.agents.designers import policy, race, random
+from rigdda import Ditch, Fence, GravityWall, Layout, Site
+from rigdda.agents.designers import policy, race, random, value
 from rigdda.agents.designers.menu import Menu, on_bound, spread
 from rigdda.agents.designers.protocol import Entry
 from rigdda.agents.designers.racing import Arm, allocation, behind
 from rigdda.agents.designers.store import Release, Store
+from rigdda.agents.designers.surrogate import Surrogate
 from rigdda.barriers import KINDS
 from rigdda.barriers.base import MIN_HEIGHT
 from rigdda.envs import DesignProblem
@@ -127,6 +129,25 @@ def test_a_search_says_where_its_layout_comes_from(valley: Valley) -> None:
         e.evaluation.layout for e in found.history.stage("search") if len(e.evaluation.layout) == 1
     }
     assert (found.origin == "search") or found.layout in first
+
+
+@pytest.mark.parametrize("designer", [policy, value, race])
+def test_a_layout_without_a_search_is_no_result_of_one(
+    designer: ModuleType, valley: Valley, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Below 160 releases, the designer `race` leaves the choice to the policy."""
+    pair = Fence(18.0, 2.0, energy_class=500), Fence(26.0, 2.0, energy_class=500)
+    monkeypatch.setattr(policy, "decide", lambda *_: pair)
+    usual = Surrogate.best
+
+    def best_pairs(self: Surrogate, n: int) -> list[Layout]:
+        ranked = usual(self, len(self.layouts))
+        return ([x for x in ranked if len(x) == 2] or ranked)[:n]
+
+    monkeypatch.setattr(Surrogate, "best", best_pairs)
+    found = designer.design(valley, 100)
+    assert found.origin == "start" and not found.history.stage("search")
+    assert len(found.layout) == 2 and found.layout == valley.check(found.layout)
 
 
 def test_what_lies_on_a_bound_is_named(site: Site) -> None:

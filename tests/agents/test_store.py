@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 from valley import SITE, Valley
 
 import rigdda.agents
-from rigdda import DoubtfulInput, Fence, Layout
+from rigdda import BadInput, DoubtfulInput, Fence, Layout
 from rigdda.agents.designers.store import Release, Store
 from rigdda.envs import DesignProblem
 from rigdda.envs.outcome_cache import unpack
@@ -50,6 +52,32 @@ def test_a_sample_keeps_what_each_release_cost(problem: DesignProblem, tmp_path:
     assert [r.reached for r in kept] == [outcome.reached for outcome in outcomes]
     assert all(isinstance(release, Release) for release in kept)
     assert written.evaluation.objective == problem.judge(FENCE, outcomes).objective
+
+
+def test_seeds_of_numpy_are_those_of_python(problem: DesignProblem, tmp_path: Path) -> None:
+    file, seeds = tmp_path / "store.jsonl", (4, 5, 6)
+    first = Store(file)
+    written = first.evaluate(problem, (), seeds)
+    (many,) = first.evaluate_many([(problem, FENCE, seeds)])
+    batch, store = first.sample(problem, FENCE, ASKED), Store(file)
+    for own in (np.array(seeds), [np.int64(4), 5, 6]):
+        assert store.evaluate(problem, (), own) == written  # type: ignore[arg-type]
+        assert [*store.evaluate_many([(problem, FENCE, own)])] == [many]  # type: ignore[list-item]
+    arrays = {name: np.array(own) for name, own in ASKED.items()}
+    assert store.sample(problem, FENCE, arrays) == batch  # type: ignore[arg-type]
+    assert store.simulated == 0
+
+
+@pytest.mark.parametrize("seeds", [(), (1, 1), (-1,), (0.5,), 3])
+def test_seeds_that_no_release_has_are_refused(problem: DesignProblem, seeds: Any) -> None:
+    store = Store()
+    with pytest.raises(BadInput, match="seeds"):
+        store.evaluate(problem, (), seeds)
+    with pytest.raises(BadInput, match="seeds"):
+        next(store.evaluate_many([(problem, (), seeds)]))
+    if seeds != ():
+        with pytest.raises(BadInput, match="seeds"):
+            store.sample(problem, (), {"block": seeds})
 
 
 @pytest.mark.parametrize("damage", ["objective", "volume", "sum", "line"])

@@ -239,3 +239,73 @@ def test_an_untrained_policy_follows_the_forecasts(table: ForecastTable) -> None
     features[..., forecasts.FORECAST_Z] = np.nan_to_num(table.z)
     least = np.where(table.mask, table.z, np.inf).argmin(axis=1)
     assert (Policy(network, LAYOUTS).choose(features, table.mask) == least).all()
+
+
+@pytest.fixture
+def cheap_training(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """Replace the simulations and the learning of a training; return the sites that it asks for."""
+    asked: list[list[str]] = []
+
+    def collect(
+        names: list[str], catalogue: tuple[str, ...], folder: Path, tick: object
+    ) -> dict[str, SiteForecasts]:
+        asked.append(list(names))
+        rng = np.random.default_rng(len(names))
+        seen = np.zeros(WIDTH, np.float32)
+        features = rng.normal(size=(len(catalogue), FEATURES))
+        z = rng.uniform(0.2, 1.0, len(catalogue))
+        z[0] = 1.0
+        return {name: SiteForecasts(seen, features, z, 100.0) for name in names}
+
+    def learn(
+        terms: Terms, table: ForecastTable, z: object, notes: dict[str, str], tick: object
+    ) -> Network:
+        mean = np.zeros(FEATURES, np.float32)
+        layer = np.zeros((1, FEATURES), np.float32), np.zeros(1, np.float32)
+        return Network(mean, mean + 1.0, [layer], notes)
+
+    monkeypatch.setattr(forecasts, "collect", collect)
+    monkeypatch.setattr(training, "learn", learn)
+    return asked
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*.*")}
+
+
+def test_a_refused_training_changes_nothing(
+    cheap_training: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    training.train(Terms(sites=3), tmp_path, lambda *_: None)
+    before = contents(tmp_path)
+    assert set(before) == {"training.json", "forecasts.safetensors", "policy.safetensors"}
+    for other in (Terms(sites=2), Terms(), Terms(sites=3, seed=1), Terms(3, "ppo")):
+        with pytest.raises(BadInput, match="another folder"):
+            training.train(other, tmp_path, lambda *_: None)
+    assert len(cheap_training) == 1 and contents(tmp_path) == before
+    assert training.recorded_terms(tmp_path)["sites"] == 3  # type: ignore[index]
+    training.train(Terms(sites=3), tmp_path, lambda *_: None)
+    assert contents(tmp_path) == before
+    usual = forecasts.collect
+
+    def changed(names: list[str], *more: object) -> dict[str, SiteForecasts]:
+        found = usual(names, *more)  # type: ignore[arg-type]
+        for own in found.values():
+            own.z[1] *= 0.5
+        return found
+
+    monkeypatch.setattr(forecasts, "collect", changed)
+    with pytest.raises(BadInput, match=r"table = .* another folder"):
+        training.train(Terms(sites=3), tmp_path, lambda *_: None)
+    assert contents(tmp_path) == before
+
+
+def test_a_table_is_rounded_as_in_its_file(cheap_training: list[list[str]], tmp_path: Path) -> None:
+    made = training.table_of(Terms(sites=3), tmp_path, lambda *_: None)
+    made.save(tmp_path / "table.safetensors")
+    read = ForecastTable.load(tmp_path / "table.safetensors")
+    assert (read.names, read.layouts, dict(read.notes)) == (made.names, made.layouts, made.notes)
+    for name in ("observation", "features", "z"):
+        own, again = getattr(made, name), getattr(read, name)
+        assert own.dtype == again.dtype == np.float32
+        np.testing.assert_array_equal(own, again)

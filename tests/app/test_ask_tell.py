@@ -58,8 +58,10 @@ def test_kinds_and_ends_of_the_box() -> None:
     assert search.layout(middle)[0].kind == search.task.kinds[0]
     assert not search.open
     assert search.best() == entries.constant(search.task)
-    with pytest.raises(BadInput, match="finite numbers from 0 to 1"):
-        search([0.5])
+    n = search.size
+    for point in ([0.5], n * [math.nan], n * ["a"], [[1.0], [1.0, 2.0]], n * [None], n * [1j]):
+        with pytest.raises(BadInput, match=f"point = .*: give {n} finite numbers from 0 to 1"):
+            search(point)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["random_search", "race", "cma", "tpe", "convex"])

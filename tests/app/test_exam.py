@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from processes import refused
 
-from rigdda import MECHANICS, BadInput, Ditch, sites
+from rigdda import MECHANICS, BadInput, Ditch, Site, sites
 from rigdda.agents.designers import catalogue, value
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
@@ -65,7 +65,7 @@ def greedy(task):
         task.evaluate((), 10**5)
     except rigdda.BadInput as bad:
         assert "are left of" in str(bad)
-    task._line.used -= 50  # makes room in its own count only
+    task._budget.used -= 50  # makes room in its own count only
     try:
         return honest(task)
     except rigdda.BadInput as bad:
@@ -283,6 +283,38 @@ def test_only_a_folder_with_submissions_belongs_to_an_entry(
     honest._read_folder(second)
     with pytest.raises(BadInput, match="an exam of another entry, source file"):
         broken._read_folder(first)
+    (tmp_path / scorer.IDENTITY).unlink()
+    with pytest.raises(
+        BadInput, match=r"submissions\.json of an unknown exam: name another folder"
+    ):
+        honest._read_folder(second)
+
+
+@pytest.mark.parametrize("place", ["sites", "corridor"])
+def test_an_exam_does_not_continue_on_a_site_that_changed(
+    place: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    file = tmp_path / "mine.toml"
+    site = Site.load("quick")
+    site.save(file)
+    usual = specification.load(folder / "spec.toml")
+    road = msgspec.structs.replace(usual.corridors[0], sites=(SITES[0], str(file)))
+    spec = msgspec.structs.replace(usual, sites=(*SITES, str(file)))
+    if place == "corridor":
+        spec = msgspec.structs.replace(usual, corridors=(road,))
+    part = specification.part(spec, sites=1)
+    job = scorer.Scorer(part, References("", {}), "entries_of_test:honest", "", tmp_path)
+    before = scorer.identity_of(part, job.functions)
+    assert before == scorer.identity_of(specification.part(spec), job.functions)
+    job._mark_folder(before)
+    job._keep(scorer.Submission(SITES[0], 60, [[]], 0, 0, []))
+    job._read_folder(scorer.identity_of(part, job.functions))
+    steeper = {n: msgspec.structs.replace(s, friction_deg=30.5) for n, s in site.surfaces.items()}
+    msgspec.structs.replace(site, surfaces=steeper).save(file)
+    after = scorer.identity_of(part, job.functions)
+    with pytest.raises(BadInput, match="an exam of another entry, source file, site, seed"):
+        job._read_folder(after)
 
 
 @pytest.mark.slow

@@ -344,6 +344,11 @@ def test_bad_actions_are_refused_and_the_episode_goes_on(
         ({"site": "train", "kinds": "fence"}, "kinds = 'fence': give a sequence"),
         ({"site": "train", "kinds": ["fence", "fence"]}, "kinds = .*: name each kind once"),
         ({"site": "bench", "kinds": ["mesh"]}, "kinds = .*: leave mesh out"),
+        ({"site": "train", "kinds": ["mesh"]}, r"kinds = \('mesh',\): .*: random-1 offers no mesh"),
+        (
+            {"site": "wide-train", "kinds": ["mesh", "removal"]},
+            "kinds = .*: add a kind that every site offers: wide-1 offers no mesh or removal",
+        ),
         ({"fidelity": "coarse"}, "coarse"),
     ],
 )
@@ -351,6 +356,26 @@ def test_bad_keywords_are_refused(keywords: dict, message: str) -> None:
     with pytest.raises(BadInput, match=message) as caught:
         BarrierDesign(**keywords)
     assert "\n" not in str(caught.value)
+
+
+def test_a_split_of_which_a_site_offers_no_kind_is_refused_before_a_site_is_drawn() -> None:
+    env = BarrierDesign("quick", kinds=["mesh"])
+    for seed in range(3):
+        with pytest.raises(BadInput, match=r"kinds = .*: random-1 offers no mesh"):
+            env.reset(seed=seed, options={"site": "train"})
+    both = BarrierDesign("train", kinds=["mesh", "ditch"])
+    assert both.slots.kinds == ("mesh", "ditch")
+
+
+@pytest.mark.parametrize(("wrong", "right"), [(3.0, 3), (True, 1), ("2", 2)])
+@pytest.mark.parametrize("site", ["quick", "train"])
+def test_a_number_of_barriers_is_checked_whatever_was_made_before(
+    wrong: object, right: int, site: str
+) -> None:
+    for _ in range(2):
+        with pytest.raises(BadInput, match=r"max_barriers = .*: give a whole number"):
+            BarrierDesign(site, max_barriers=wrong)  # type: ignore[arg-type]
+        assert BarrierDesign(site, max_barriers=np.int64(right)).slots.count == right
 
 
 def test_a_barrier_that_is_asked_for_and_not_built_is_told() -> None:

@@ -188,6 +188,12 @@ def test_the_bridge_says_what_the_batch_says() -> None:
     assert truncations > 0
 
 
+def test_environments_of_others_are_refused_for_stable_baselines3() -> None:
+    pytest.importorskip("stable_baselines3")
+    with pytest.raises(BadInput, match="id = 'CartPole-v1': name an environment of this package"):
+        rigdda.envs.sb3_vec_env("CartPole-v1", 2)
+
+
 @every
 def test_ppo_learns_on_copies(name: str) -> None:
     ppo = pytest.importorskip("stable_baselines3").PPO

@@ -255,12 +255,54 @@ def test_malformed_corridors(values: dict[str, object], named: str) -> None:
         ({"budget": "much"}, "budget"),
         ({"budget": (5.0, 1.0)}, "budget"),
         ({"lengths": (0.0, 1.0)}, "lengths"),
+        ({"lengths": 0.0}, "lengths = 0.*above 0"),
+        ({"lengths": 0}, "lengths = 0.*above 0"),
+        ({"lengths": 0.04}, r"lengths = 0\.04: .* of at least 0\.1 m"),
+        ({"lengths": (0.001, 300.0)}, r"lengths = \(0\.001, 300\.0\): .* of at least 0\.1 m"),
+        ({"budget": (0.0, 5.0)}, "budget"),
+        (
+            {"site": ["quick", "bench"], "kinds": ["mesh"]},
+            r"kinds = \('mesh',\): add a kind that every site offers: bench offers no mesh",
+        ),
+        ({"site": "train", "kinds": ["mesh"]}, "kinds = .*: random-1 offers no mesh"),
+        ({"site": "corridor-12", "kinds": ["mesh"]}, "kinds = .* offers no mesh"),
+        ({"max_barriers": 3.0}, r"max_barriers = 3\.0: give a whole number"),
         ({"releases": 0}, "releases"),
     ],
 )
 def test_malformed_keywords(keywords: dict[str, object], named: str) -> None:
     with pytest.raises(BadInput, match=named):
         make(**keywords)
+
+
+def test_the_shortest_lengths_are_not_rounded_to_nothing() -> None:
+    for lengths in (0.1, (0.1, 0.2), (0.06, 300.0)):
+        env = make(lengths=lengths, budget=0.0)
+        for seed in range(5):
+            env.reset(seed=seed)
+            assert all(section.length >= 0.1 for section in env.placed)
+
+
+def test_a_layout_that_costs_what_is_left_is_built_from_a_rounded_action() -> None:
+    """Actions have 32 bits, and their layouts may be a little dearer than those in 64 bits."""
+    env = make(site=["quick"], lengths=100.0)
+    rng, dearer = np.random.default_rng(0), 0
+    env.reset(seed=0)
+    for _ in range(60):
+        vector = np.tile([1.0, *rng.uniform(-0.9, 0.9, 3), -1.0, 1.0], 3)
+        vector[6:] = -1.0
+        layout = env.slots.decode(env.problem, vector)
+        if not layout:  # there is no place for it
+            continue
+        cost = env.problem.site.capital(layout)
+        env.reset(seed=0, options={"budget": cost})
+        action = env.slots.encode(env.problem, layout).astype(np.float32)
+        ask = env.ask(action)
+        assert ask is not None and len(ask.layout) == len(layout) == 1
+        dearer += env.problem.site.capital(ask.layout) > cost * (1.0 + 1e-9)
+    assert dearer > 5
+    env.reset(seed=0, options={"budget": cost * (1.0 - 1e-5)})
+    assert env.ask(action) is None
 
 
 def test_the_objective_of_a_corridor_is_that_of_its_sections() -> None:

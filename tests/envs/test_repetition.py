@@ -63,6 +63,22 @@ def test_an_episode_is_repeated_to_the_last_bit(
     assert found.same and not found.other_versions
 
 
+@pytest.mark.parametrize(
+    "keywords",
+    [
+        {"site": "old-fence", "kinds": ("removal",)},
+        {"site": ["old-fence"], "kinds": ("removal", "mesh", "ditch")},  # drawn: without mesh
+        {"site": "slab-cut", "targets": {"individual": 1e-6}},
+    ],
+)
+def test_kinds_and_targets_that_only_this_site_allows_are_repeated(
+    keywords: dict[str, Any], tmp_path: Path
+) -> None:
+    """Sites of the splits have neither traffic nor, most of them, an old fence."""
+    path, _ = played("rigdda/BarrierDesign-v0", tmp_path, releases=1, **keywords)
+    assert repeat(replay_record.load(path)).same
+
+
 @every
 def test_episodes_of_copies_are_repeated(name: str, tmp_path: Path) -> None:
     batch = gymnasium.make_vec(

@@ -81,7 +81,7 @@ def offer(problem: DesignProblem) -> Offer:
     costs, gains = [0.0], [0.0]
     capital, value = pool.capital - site.capital(()), pool.value()
     for k in np.lexsort((value, capital)).tolist():
-        gain = pool.worth * (1.0 - float(value[k]))
+        gain = pool.worth * (pool.bare - float(value[k]))
         if gain > gains[-1]:
             layouts.append(pool.layouts[k])
             costs.append(float(capital[k]))

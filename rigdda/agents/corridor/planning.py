@@ -18,6 +18,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -35,6 +36,7 @@ from rigdda import (
 from rigdda.agents.corridor import allocation, programme
 from rigdda.agents.corridor.programme import SIMPLE_METHODS, Choice, Increment, Options
 from rigdda.agents.designers import front
+from rigdda.agents.designers.front import SearchedFront
 from rigdda.agents.designers.protocol import Entry
 from rigdda.agents.designers.store import Store, identity
 from rigdda.agents.limits import SEED
@@ -52,13 +54,15 @@ SEARCH_SHARE, CHOICE_SHARE = 0.5, 0.3
 report."""
 
 LEAST_PER_LAYOUT, USUAL_PER_LAYOUT = 10, 30
-"""Least and usual number of releases of each layout before releases go to those at the margin."""
+"""Least and usual number of releases of each layout before releases go to those at the margin. The
+least number is used even if the releases for the choice do not suffice for it."""
 
 ROUNDS = 12
 """Number of rounds after which the shadow prices are computed again."""
 
 LEAST_REPORTED, MOST_REPORTED = 100, 5_000
-"""Least and largest number of releases for the report of a layout."""
+"""Least and largest number of releases for the report of a layout. The least number is used even if
+the releases for the report do not suffice for it."""
 
 SCENARIOS = 400
 """Number of scenarios of the robust choice."""
@@ -185,7 +189,7 @@ class CorridorPlan:
     plans : tuple of BudgetPlan
         A plan for each budget; the last one is for unlimited money.
     releases : int
-        Number of releases that were used.
+        Number of releases that were used, with those that an interrupted plan had stored.
     """
 
     problem: CorridorProblem
@@ -207,7 +211,10 @@ class Planner:
     problem : CorridorProblem
         The problem.
     releases : int
-        Number of releases per section, of which those at the margin may go to other sections.
+        Number of releases per section, of which those at the margin may go to other sections. With
+        few of them, more are used: every layout of a front has at least `LEAST_PER_LAYOUT`, and at
+        least two of each event, for the choice, and every chosen layout has at least
+        `LEAST_REPORTED` for the report.
     seed : int
         Seed of the searches and of all releases.
     robust : bool
@@ -289,16 +296,16 @@ class Planner:
         )
         for s, problem in enumerate(self.problem.problems):
             self._tick(self.used, f"searching {self._name(s)}")
-            layouts = found[s]
-            if layouts is None:
-                layouts = next(new)
-                _write(files[s], layouts)
+            searched = found[s]
+            if searched is None:
+                searched = next(new)
+                _write(files[s], searched)
             site = problem.site
-            options = [Option(own, site.capital(own), site.annual(own)) for own in layouts]
+            options = [Option(own, site.capital(own), site.annual(own)) for own in searched.layouts]
             self.fronts.append(options)
-            self.used += budget
+            self.used += searched.releases
 
-    def _searched(self, ask: tuple[int, DesignProblem, int, int]) -> tuple[Layout, ...]:
+    def _searched(self, ask: tuple[int, DesignProblem, int, int]) -> SearchedFront:
         """Return the front of a section; report progress and store evaluations."""
         s, problem, budget, seed = ask
         begun, words = self.used, f"searching {self._name(s)}"
@@ -307,7 +314,7 @@ class Planner:
             self._tick(begun + entry.simulations, words)
 
         path = None if self._folder is None else self._folder / f"search-{s + 1:04d}.jsonl"
-        return front.layouts(problem, budget, seed, told, Store(path))
+        return front.search(problem, budget, seed, told, Store(path))
 
     def evaluate(self, stream: str, wanted: Sequence[tuple[int, int, int]]) -> list[Evaluation]:
         """Evaluate options on releases of a stream; the evaluations contain the outcomes.
@@ -446,28 +453,37 @@ class Planner:
         return out
 
 
-def _searched(ask: tuple[int, DesignProblem, int, int]) -> tuple[Layout, ...]:
+def _searched(ask: tuple[int, DesignProblem, int, int]) -> SearchedFront:
     """Return the front of a section that was sent to this worker."""
     _, problem, budget, seed = ask
-    return front.layouts(problem, budget, seed)
+    return front.search(problem, budget, seed)
 
 
-def _read(file: Path | None) -> tuple[Layout, ...] | None:
-    """Return the stored layouts of a front, None if there are none or they are damaged."""
+class StoredFront(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Content of the file of a front: its layouts as tables, and the releases of its search."""
+
+    layouts: list[list[dict[str, Any]]]
+    releases: int
+
+
+def _read(file: Path | None) -> SearchedFront | None:
+    """Return the stored front of a section, None if there is none or it is damaged."""
     if file is None or not file.is_file():
         return None
     try:
-        rows = msgspec.json.decode(file.read_bytes())
-        return tuple(tuple(from_table("front", row) for row in layout) for layout in rows)
+        kept = msgspec.json.decode(file.read_bytes(), type=StoredFront)
+        layouts = [tuple(from_table("front", row) for row in layout) for layout in kept.layouts]
     except (msgspec.MsgspecError, BadInput, TypeError):
         return None
+    return SearchedFront(tuple(layouts), kept.releases)
 
 
-def _write(file: Path | None, layouts: Sequence[Layout]) -> None:
-    """Store the layouts of a front."""
+def _write(file: Path | None, found: SearchedFront) -> None:
+    """Store the front of a section."""
     if file is not None:
+        kept = StoredFront([to_tables(layout) for layout in found.layouts], found.releases)
         with atomic(file) as part:
-            part.write_bytes(msgspec.json.encode([to_tables(layout) for layout in layouts]))
+            part.write_bytes(msgspec.json.encode(kept))
 
 
 def _missed(options: Options, choice: Choice) -> tuple[float, ...]:
@@ -511,7 +527,7 @@ def plan(
     corridor : Corridor or CorridorProblem
         The corridor.
     releases : int
-        Number of releases per section.
+        Number of releases per section; with few of them, more are used, see `Planner`.
     seed : int
         Seed of the searches and of all releases.
     robust : bool

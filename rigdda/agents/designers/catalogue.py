@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import (
+    BadInput,
     Barrier,
     Ditch,
     Fence,
@@ -22,16 +23,17 @@ from rigdda import (
     Mesh,
     Simulation,
     Site,
+    check,
     distribution,
 )
 from rigdda.agents.designers.menu import Menu
-from rigdda.agents.designers.protocol import Ledger
 from rigdda.barriers import Removal
 from rigdda.barriers.base import ELEMENT
 from rigdda.barriers.fence import PANEL
 from rigdda.barriers.gravity_wall import SLID
 from rigdda.envs import DesignProblem
 from rigdda.envs.outcome_cache import Memory, release_key
+from rigdda.envs.problem import checked_seeds
 from rigdda.geometry import polygon_properties
 from rigdda.seeds import release_seeds
 
@@ -112,13 +114,6 @@ def ensemble_seeds(site: Site, seed: int, simulations: int) -> dict[str, tuple[i
     return {name: release_seeds("ensemble", seed, each) for name in few}
 
 
-def ensemble_for(ledger: Ledger, stations: Floats) -> CrossingEnsemble:
-    """Return the ensemble of a designer and charge its releases to the budget."""
-    seeds = ensemble_seeds(ledger.problem.site, ledger.seed, ledger.budget)
-    ledger.used += sum(map(len, seeds.values()))
-    return ensemble(ledger.problem.site, seeds, stations)
-
-
 def ensemble(site: Site, seeds: Mapping[str, Sequence[int]], stations: Floats) -> CrossingEnsemble:
     """Simulate releases without barriers in threads on all cores and return their crossings.
 
@@ -129,16 +124,18 @@ def ensemble(site: Site, seeds: Mapping[str, Sequence[int]], stations: Floats) -
     site : Site
         The site.
     seeds : mapping of str to sequence of int
-        Release seeds by name of event.
+        Release seeds by name of event, at least one in all. The seeds of an event are distinct.
     stations : (K,) array
         Chainages of the stations, ascending [m].
 
     Raises
     ------
+    BadInput
+        If there is no such event, or the seeds or the stations are invalid.
     Diverged
         If a simulation diverges.
     """
-    jobs = tuple((name, seed) for name, drawn in seeds.items() for seed in drawn)
+    jobs = _jobs(site, seeds)
     places = tuple(np.asarray(stations).tolist())
     key = release_key(site), site.standing(), jobs, places
     found = memory.recall([key]).get(key)
@@ -150,6 +147,29 @@ def ensemble(site: Site, seeds: Mapping[str, Sequence[int]], stations: Floats) -
 
 memory: Memory[tuple[Hashable, ...], CrossingEnsemble] = Memory(4)
 """Ensembles by what affects their releases, the releases and the stations."""
+
+
+def seeds_by_event(seeds: Mapping[str, Sequence[int]]) -> dict[str, tuple[int, ...]]:
+    """Return the release seeds of each event as a tuple of distinct whole numbers.
+
+    Raises
+    ------
+    BadInput
+        If they are not a mapping of such seeds.
+    """
+    given = check.mapping("seeds", seeds, object, "sequences of whole numbers")
+    return {name: checked_seeds(f"seeds[{name!r}]", drawn, 0) for name, drawn in given.items()}
+
+
+def _jobs(site: Site, seeds: Mapping[str, Sequence[int]]) -> tuple[tuple[str, int], ...]:
+    """Return the event and the seed of each release, which are at least one and all distinct."""
+    jobs: list[tuple[str, int]] = []
+    for name, drawn in seeds_by_event(seeds).items():
+        site.event(name)
+        jobs += [(name, seed) for seed in drawn]
+    if not jobs:
+        raise BadInput("seeds", dict(seeds), "give at least one seed of an event")
+    return tuple(jobs)
 
 
 def _simulate(
@@ -213,12 +233,14 @@ class Catalogue:
     relief : (R, J) array
         Reduction of the harm of each release by each barrier [EUR].
     annual : (J,) array
-        Annual cost of each barrier including its expected repair, in addition to the upkeep of
-        existing barriers [EUR per m].
+        Annual cost of each barrier including its expected repair, in addition to `standing`
+        [EUR per m and year].
     capital : (J,) array
         Capital cost of each barrier [EUR per m].
     span : (J, 2) array
         Chainages of the start and the end of each barrier [m].
+    standing : float
+        Upkeep of the existing barriers [EUR per m and year].
     """
 
     barriers: list[Barrier]
@@ -228,18 +250,25 @@ class Catalogue:
     annual: Floats
     capital: Floats
     span: Floats
+    standing: float
+
+    @property
+    def nothing(self) -> float:
+        """Estimated Z without barriers [EUR per m and year]."""
+        return self.standing + float(self.weight @ self.base)
 
     @property
     def objective(self) -> Floats:
         """Estimated Z of each barrier alone, (J,) [EUR per m and year]."""
-        return self.annual + self.weight @ (self.base[:, None] - self.relief)
+        left: Floats = self.weight @ (self.base[:, None] - self.relief)
+        return self.standing + (self.annual + left)
 
     def take(self, chosen: Sequence[int] | NDArray[np.int64]) -> Catalogue:
         """Return the catalogue of the barriers with the given indices."""
         i = np.asarray(chosen, dtype=np.int64)
         barriers = [self.barriers[j] for j in i.tolist()]
         own = self.relief[:, i], self.annual[i], self.capital[i], self.span[i]
-        return Catalogue(barriers, self.weight, self.base, *own)
+        return Catalogue(barriers, self.weight, self.base, *own, self.standing)
 
 
 def tabulate(
@@ -258,7 +287,7 @@ def tabulate(
         repair = capital[j] * float(weight @ mended)
         annual[j] = site.annual((barrier,)) - standing + repair
     span = np.array([[b.x, b.x + b.extent] for b in barriers]).reshape(-1, 2)
-    return Catalogue(barriers, weight, effects.base, relief, annual, capital, span)
+    return Catalogue(barriers, weight, effects.base, relief, annual, capital, span, standing)
 
 
 def whole(problem: DesignProblem, ensemble: CrossingEnsemble, menu: Menu) -> Catalogue:

@@ -4,9 +4,11 @@ The programme chooses one, two or three barriers from a catalogue that estimates
 (`rigdda.agents.designers.catalogue`). With z[j] = 1 if barrier j is built, and h_r the remaining
 harm of release r,
 
-    minimise    annual.z + weight.h
+    minimise    standing + annual.z + weight.h
     subject to  h_r >= base_r - sum_j relief[r, j] z[j],  h_r >= 0
                 sum z <= max_barriers, capital.z <= max_cost, and barriers do not overlap
+
+`standing` is the upkeep of the existing barriers, a constant.
 
 The sum of the reliefs overestimates the joint effect of two barriers. Therefore further programmes
 scale the reliefs down. The estimate also neglects the effect of a barrier on the motion farther
@@ -25,13 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigdda import Fence, Layout
-from rigdda.agents.designers.catalogue import (
-    Catalogue,
-    CrossingEnsemble,
-    Floats,
-    ensemble_for,
-    whole,
-)
+from rigdda.agents.designers.catalogue import Catalogue, CrossingEnsemble, Floats, whole
 from rigdda.agents.designers.constant import constant
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import DesignResult, Ledger, Progress, Proposals, search
@@ -80,8 +76,7 @@ def choose(
         Largest capital cost [EUR per m].
     """
     if not catalogue.barriers:
-        nothing = float(catalogue.weight @ catalogue.base)
-        return Choice((), nothing, nothing)
+        return Choice((), catalogue.nothing, catalogue.nothing)
     bound, _ = _solve(catalogue, slots, share, max_cost, boolean=False)
     value, z = _solve(catalogue, slots, share, max_cost, boolean=True)
     built = [catalogue.barriers[j] for j in np.flatnonzero(z > 0.5).tolist()]
@@ -111,8 +106,9 @@ def _solve(
     with suppress(ValueError, cp.SolverError):
         problem.solve(solver=cp.HIGHS, mip_rel_gap=GAP)
     if z.value is None:  # no barrier is always a solution
-        return scale, np.zeros(len(catalogue.barriers))
-    return scale * float(problem.value), np.asarray(z.value, dtype=np.float64)
+        return catalogue.nothing, np.zeros(len(catalogue.barriers))
+    least = catalogue.standing + scale * float(problem.value)
+    return least, np.asarray(z.value, dtype=np.float64)
 
 
 GAP = 0.01
@@ -165,7 +161,7 @@ def design(
         If the budget is below 2 or the seed out of range; if a simulation diverges.
     """
     ledger, menu = Ledger(problem, simulations, seed, progress, store), Menu(problem)
-    ensemble = ensemble_for(ledger, menu.stations)
+    ensemble = ledger.ensemble(menu.stations)
     choices = best_choices(problem, ensemble, menu)
     layouts = [*(choice.layout for choice in choices), answer(problem).layout]
     ledger.starts |= set(layouts)
@@ -225,7 +221,7 @@ CHEAPER = ((0, 1), (1, 0), (1, 1), (0, 2))
 def starts(ledger: Ledger) -> list[Layout]:
     """Return the starting layouts of a search, the most promising first."""
     menu = Menu(ledger.problem)
-    ensemble = ensemble_for(ledger, menu.stations)
+    ensemble = ledger.ensemble(menu.stations)
     ledger.known = tuple(unsearched(ledger.problem, menu))
     optima = [choice.layout for choice in best_choices(ledger.problem, ensemble, menu)]
     found = list(dict.fromkeys([*optima, *known(ledger.problem, menu), ()]))

@@ -9,6 +9,8 @@ is a list of layouts to be compared on other releases.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from rigdda import Layout
@@ -29,6 +31,22 @@ MOST_LAYOUTS = 12
 """Largest number of layouts of a front, including no barrier."""
 
 
+@dataclass(frozen=True, slots=True)
+class SearchedFront:
+    """Result of a search for a front.
+
+    Parameters
+    ----------
+    layouts : tuple of Layout
+        The layouts, from no barrier, the cheapest, to that of the least Z.
+    releases : int
+        Number of releases that were used, including those without barriers.
+    """
+
+    layouts: tuple[Layout, ...]
+    releases: int
+
+
 def layouts(
     problem: DesignProblem,
     simulations: int,
@@ -36,6 +54,23 @@ def layouts(
     progress: Progress | None = None,
     store: Store | None = None,
 ) -> tuple[Layout, ...]:
+    """Return the layouts of `search`.
+
+    Raises
+    ------
+    BadInput, Diverged
+        As `search` does.
+    """
+    return search(problem, simulations, seed, progress, store).layouts
+
+
+def search(
+    problem: DesignProblem,
+    simulations: int,
+    seed: int = 0,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> SearchedFront:
     """Return up to `MOST_LAYOUTS` layouts, from no barrier, the cheapest, to that of the least Z.
 
     Raises
@@ -51,7 +86,8 @@ def layouts(
     track.expect = surrogate.expect
     explore(track, surrogate, ledger.left, PRICES)
     found = dict.fromkeys([(), *known, *front(surrogate, MOST_LAYOUTS - 1 - len(known))])
-    return tuple(sorted(found, key=lambda layout: (problem.site.capital(layout), len(layout))))
+    order = sorted(found, key=lambda layout: (problem.site.capital(layout), len(layout)))
+    return SearchedFront(tuple(order), ledger.used)
 
 
 def front(surrogate: Surrogate, most: int) -> list[Layout]:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigdda import BadInput, Layout
-from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble_for
+from rigdda.agents.designers.catalogue import CrossingEnsemble
 from rigdda.agents.designers.menu import Menu
 from rigdda.agents.designers.protocol import Designer, DesignResult, Ledger, Progress
 from rigdda.agents.designers.store import Store
@@ -96,8 +96,9 @@ def using(policy: Policy) -> Designer:
         store: Store | None = None,
     ) -> DesignResult:
         ledger = Ledger(problem, simulations, seed, progress, store)
-        layout = decide(policy, problem, ensemble_for(ledger, Menu(problem).stations))
-        return ledger.result(ledger.evaluate(layout, "report", min(FINAL, ledger.left)))
+        layout = decide(policy, problem, ledger.ensemble(Menu(problem).stations))
+        found = ledger.evaluate(layout, "report", min(FINAL, ledger.left))
+        return ledger.result(found, "start")
 
     return design
 

@@ -22,6 +22,7 @@ from rigdda import (
     check,
     display,
 )
+from rigdda.agents.designers.catalogue import CrossingEnsemble, ensemble_seeds
 from rigdda.agents.designers.frontier import Tally, TriedLayout, frontier
 from rigdda.agents.designers.menu import on_bound
 from rigdda.agents.designers.store import Store, StoredEvaluation
@@ -149,7 +150,8 @@ class DesignResult:
     simulations : int
         Number of releases that the designer used, including its ensemble without barriers.
     origin : {"start", "search"}
-        Whether the layout is one of the starting layouts or a result of the search.
+        Whether the layout is a result of the search. Otherwise it is one of the starting layouts,
+        or was chosen without a search.
     on_bound : tuple of str
         Descriptions of the properties of the layout that lie on a bound of the zone, of the kind of
         barrier or of the list of energy classes.
@@ -288,6 +290,14 @@ class Ledger:
         self._tally.add(layout, batch.evaluation.cost, stage, found, more=True)
         self._enter(stage, batch.evaluation)
         return batch
+
+    def ensemble(self, stations: NDArray[np.float64]) -> CrossingEnsemble:
+        """Return the ensemble without barriers of a search with this budget."""
+        site = self.problem.site
+        seeds = ensemble_seeds(site, self.seed, self.budget)
+        found = self._store.crossings(site, seeds, stations)
+        self.used += sum(map(len, seeds.values()))
+        return found
 
     def _enter(self, stage: str, evaluation: Evaluation) -> None:
         self.entries.append(Entry(self.used, stage, evaluation))

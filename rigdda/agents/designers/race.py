@@ -26,7 +26,6 @@ import numpy as np
 
 from rigdda import Layout, check
 from rigdda.agents.designers import policy
-from rigdda.agents.designers.catalogue import ensemble_for
 from rigdda.agents.designers.convex import unsearched
 from rigdda.agents.designers.forecast import Forecast, Value, value_network
 from rigdda.agents.designers.menu import Menu
@@ -147,7 +146,7 @@ def forecast_pool(
     `value` is the network for the forecasts, by default the one that ships with the package.
     """
     problem, singles = ledger.problem, single_barriers(menu)
-    forecast = Forecast(problem, ensemble_for(ledger, menu.stations), value or value_network())
+    forecast = Forecast(problem, ledger.ensemble(menu.stations), value or value_network())
     ledger.starts |= {*known, *singles}
     return forecasts_of(forecast, menu, known, singles)
 

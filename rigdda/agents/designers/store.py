@@ -17,11 +17,25 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
-from rigdda import MECHANICS, BadInput, DoubtfulInput, Layout, Outcome, __version__, distribution
+from rigdda import (
+    MECHANICS,
+    BadInput,
+    DoubtfulInput,
+    Layout,
+    Outcome,
+    Site,
+    __version__,
+    distribution,
+)
+from rigdda.agents.designers import catalogue
+from rigdda.agents.designers.catalogue import CrossingEnsemble, seeds_by_event
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.intervals import estimate
 from rigdda.envs.outcome_cache import pack, unpack
+from rigdda.envs.problem import checked_seeds
 from rigdda.files import atomic
 
 PROBLEM_FILE = "problem.json"
@@ -217,7 +231,7 @@ class Store:
         BadInput, Diverged
             The same errors as `DesignProblem.evaluate`.
         """
-        drawn = tuple(seeds)
+        drawn = checked_seeds("seeds", seeds)
 
         def simulate() -> StoredEvaluation:
             return _evaluated((problem, layout, drawn), self._keeps)
@@ -237,11 +251,11 @@ class Store:
         BadInput, Diverged
             The same errors as `DesignProblem.evaluate`.
         """
-        keys = [_key(problem, layout, tuple(seeds)) for problem, layout, seeds in asks]
-        new = {k: ask for k, ask in zip(keys, asks, strict=True) if self._stored(k) is None}
+        whole = [(problem, own, checked_seeds("seeds", seeds)) for problem, own, seeds in asks]
+        keys = [_key(*ask) for ask in whole]
+        new = {k: ask for k, ask in zip(keys, whole, strict=True) if self._stored(k) is None}
         found = distribution.mapped(partial(_evaluated, keeps=self._keeps), list(new.values()))
-        for key, (_, layout, seeds) in zip(keys, asks, strict=True):
-            drawn = tuple(seeds)
+        for key, (_, layout, drawn) in zip(keys, whole, strict=True):
             kept = self._recall(key, layout, drawn, lambda: next(found))
             outcomes = tuple(unpack(kept.outcomes)) if self._keeps else ()
             yield replace(kept.evaluation, layout=layout, seeds=drawn, outcomes=outcomes)
@@ -266,7 +280,7 @@ class Store:
         BadInput, Diverged
             The same errors as `DesignProblem.sample`.
         """
-        asked = {name: tuple(drawn) for name, drawn in seeds.items()}
+        asked = seeds_by_event(seeds)
 
         def simulate() -> StoredEvaluation:
             outcomes = problem.sample(layout, asked)
@@ -289,6 +303,15 @@ class Store:
         key = _key(problem, layout, sorted(asked.items()))
         found = self._recall(key, layout, drawn, simulate)
         return replace(found, evaluation=replace(found.evaluation, layout=layout))
+
+    def crossings(
+        self, site: Site, seeds: Mapping[str, Sequence[int]], stations: NDArray[np.float64]
+    ) -> CrossingEnsemble:
+        """Return the crossings of stations in releases without barriers, which are not stored.
+
+        The arguments and errors are those of `rigdda.agents.designers.catalogue.ensemble`.
+        """
+        return catalogue.ensemble(site, seeds, stations)
 
     def outcomes(
         self, problem: DesignProblem, layout: Layout, seeds: Mapping[str, Sequence[int]]

@@ -81,6 +81,12 @@ class Surrogate:
 
     Attributes
     ----------
+    worth : float
+        Risk without barriers: Z without barriers less the upkeep of existing barriers [EUR per m
+        and year], or the debris on the road without prices.
+    bare : float
+        Z without barriers over the risk without barriers [-]: 1, plus the upkeep of existing
+        barriers over the risk.
     layouts : list of Layout
         The pool.
     mean, deviation : (M,) arrays
@@ -97,6 +103,7 @@ class Surrogate:
         standing = site.annual(()) if self.priced else 0.0
         self.worth = (without.objective - standing) if self.priced else without.debris
         self.worth = max(self.worth, 1e-9)
+        self.bare = 1.0 + standing / self.worth
         names = site.event_names
         bare = [without.by_event[name] for name in names] if self.priced else [1.0] * len(names)
         self._bare = np.array(bare) / max(math.fsum(bare), 1e-300)
@@ -120,8 +127,7 @@ class Surrogate:
         site = self.problem.site
         new = [x for x in dict.fromkeys(layouts) if x and x not in self.place]
         annual = [site.annual(x) if self.priced else 0.0 for x in new]
-        most = self.worth + (site.annual(()) if self.priced else 0.0)
-        most = math.inf if self.has_targets else most
+        most = math.inf if self.has_targets else self.bare * self.worth
         new = [x for x, a in zip(new, annual, strict=True) if a < most]
         if not new:
             return
@@ -205,7 +211,7 @@ class Surrogate:
         risk are weighted with their precision.
         """
         if not arm.layout and self.priced:
-            return 1.0 + arm.annual / self.worth, 0.0
+            return self.bare, 0.0
         left, variance = remaining(arm, nothing)
         left, variance = left / self.worth, variance / self.worth**2 + 1e-9
         row = self.place.get(arm.layout)
@@ -222,15 +228,14 @@ class Surrogate:
         It is relative to the least Z now, see `expected_gain`.
         """
         value = self.value()
-        bare = 1.0 + (self.problem.site.annual(()) / self.worth if self.priced else 0.0)
         if not layouts:
             return 0.0
         columns = self._columns([self.place[layout] for layout in layouts])
-        least = min(float(value.min()), bare)
+        least = min(float(value.min()), self.bare)
         near = value - HOPELESS_DEVIATIONS * self.deviation <= least
-        values = np.append(value[near], bare)
+        values = np.append(value[near], self.bare)
         change = np.concatenate([columns[:, near], np.zeros((len(columns), 1))], axis=1)
-        floor = np.append(self.annual[near] / self.worth, bare)
+        floor = np.append(self.annual[near] / self.worth, self.bare)
         return expected_gain(values, change, floor) / max(least, 1e-9)
 
     def promising(self, n: int, hope: float, price: float = 0.0) -> list[Layout]:

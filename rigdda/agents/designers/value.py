@@ -36,6 +36,7 @@ def design(
     ledger, menu = Ledger(problem, simulations, seed, progress, store), Menu(problem)
     surrogate = forecast_pool(ledger, menu, unsearched(problem, menu))
     best = surrogate.best(1)
-    forecast = surrogate.value()[surrogate.place[best[0]]] if best else 1.0
-    layout = best[0] if best and (forecast < 1.0 or surrogate.has_targets) else ()
-    return ledger.result(ledger.evaluate(layout, "report", min(REPORT_RELEASES, ledger.left)))
+    forecast = surrogate.value()[surrogate.place[best[0]]] if best else surrogate.bare
+    layout = best[0] if best and (forecast < surrogate.bare or surrogate.has_targets) else ()
+    found = ledger.evaluate(layout, "report", min(REPORT_RELEASES, ledger.left))
+    return ledger.result(found, "start")

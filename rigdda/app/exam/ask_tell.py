@@ -86,9 +86,13 @@ class AskTell:
         BadInput
             If the point is not a vector of `size` finite numbers.
         """
-        vector: NDArray[np.float64] = np.asarray(point, dtype=np.float64)
+        hint = f"give {self.size} finite numbers from 0 to 1"
+        try:
+            vector: NDArray[np.float64] = np.asarray(point, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            raise BadInput("point", point, hint) from None
         if vector.shape != (self.size,) or not np.isfinite(vector).all():
-            raise BadInput("point", vector.shape, f"give {self.size} finite numbers from 0 to 1")
+            raise BadInput("point", vector.shape, hint)
         return self.task.problem.decode(2.0 * vector - 1.0)
 
     def __call__(self, point: ArrayLike) -> float:

@@ -21,7 +21,7 @@ from rigdda.app.exam.messages import (
     Tables,
     TaskOrder,
 )
-from rigdda.app.exam.task import Task, count_crossings
+from rigdda.app.exam.task import Budget, Task, count_crossings
 from rigdda.barriers import from_table
 from rigdda.envs import DesignProblem
 
@@ -145,6 +145,7 @@ def practice(site: str, budget: int = 500, seed: int = 0, max_barriers: int = 3)
     problem = DesignProblem(site, max_barriers)
     releases = check.integer("budget", budget, 0)
     counter = ReleaseCounter([problem], releases)
-    task = Task(problem, str(site), releases, check.integer("seed", seed, 0, SEED), counter)
+    number = check.integer("seed", seed, 0, SEED)
+    task = Task(problem, str(site), Budget(releases), number, counter)
     count_crossings([task])
     return task

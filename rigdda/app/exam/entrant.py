@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from rigdda import BadInput, Simulation
+from rigdda import BadInput, Simulation, lumped_mass
 from rigdda.app.exam.messages import (
     BatchReply,
     CrossingsReply,
@@ -46,19 +46,13 @@ SIMULATED = "simulated releases itself ({name}) instead of asking Task.evaluate"
 
 
 class PipeLine:
-    """Connection to the scorer through a pipe.
-
-    Attributes
-    ----------
-    used : int
-        Number of releases of the present task.
-    """
+    """Connection to the scorer through a pipe."""
 
     def __init__(self, pipe: Connection):
-        self._pipe, self._lock, self.used = pipe, Lock(), 0
+        self._pipe, self._lock = pipe, Lock()
 
     def ask(self, request: ReleaseRequest) -> BatchReply | CrossingsReply:
-        """Send a request for releases, count them and return the reply.
+        """Send a request for releases and return the reply.
 
         Raises
         ------
@@ -68,9 +62,8 @@ class PipeLine:
         with self._lock:
             self._pipe.send_bytes(encode(request))
             reply = decode_reply(self._pipe.recv_bytes())
-            if isinstance(reply, RefusedReply):
-                raise BadInput(reply.field, reply.value, reply.hint)
-            self.used += request.releases
+        if isinstance(reply, RefusedReply):
+            raise BadInput(reply.field, reply.value, reply.hint)
         return reply
 
     def tell(self, message: Message) -> None:
@@ -79,7 +72,7 @@ class PipeLine:
 
     def order(self) -> TaskOrder | None:
         """Return the next task, or None if there is none."""
-        message, self.used = self._pipe.recv_bytes(), 0
+        message = self._pipe.recv_bytes()
         return msgspec.msgpack.decode(message, type=TaskOrder) if message else None
 
 
@@ -89,15 +82,17 @@ def refuse_simulations(line: PipeLine) -> None:
     This prevents an entry from simulating uncounted releases by mistake. It does not prevent an
     entry from doing so on purpose.
     """
-    for kind, method, name in (
-        (Simulation, "__init__", "Simulation"), (SingleBlock, "run", "rigdda.release")
-    ):  # fmt: skip
+    for owner, attribute, name in (
+        (Simulation, "__init__", "Simulation"),
+        (SingleBlock, "run", "rigdda.release"),
+        (lumped_mass, "trajectories", "rigdda.lumped"),
+    ):
 
         def refuse(*_: Any, name: str = name, **__: Any) -> None:
             line.tell(FlagRequest(SIMULATED.format(name=name)))
             raise BadInput("simulation", name, "simulate with Task.evaluate, which counts releases")
 
-        setattr(kind, method, refuse)
+        setattr(owner, attribute, refuse)
 
 
 def load(option: Option, name: str) -> Entry:

@@ -203,13 +203,16 @@ class Scorer:
         Raises
         ------
         BadInput
-            If it has submissions of another run.
+            If it has submissions of another run, or does not tell of which run they are.
         """
         file, known = self.folder / IDENTITY, self.folder / SUBMISSIONS
         if not known.is_file():
             return
-        if file.is_file() and _decoded(file, dict[str, str]) != identity:
-            hint = "it contains an exam of another entry, source file, seed or version: "
+        if not file.is_file():
+            hint = f"it contains {SUBMISSIONS} of an unknown exam: name another folder"
+            raise BadInput("--out", str(self.folder), hint)
+        if _decoded(file, dict[str, str]) != identity:
+            hint = "it contains an exam of another entry, source file, site, seed or version: "
             hint += "name another folder"
             raise BadInput("--out", str(self.folder), hint)
         rows = _decoded(known, list[Submission])
@@ -375,13 +378,17 @@ def _decoded(file: Path, of: type[Any]) -> Any:
 def identity_of(asked: ExamPart, functions: Functions) -> dict[str, str]:
     """Return what distinguishes a run from others, also the source files of the functions.
 
+    The sites count with their contents. The part of the exam does not count, so that a run may
+    continue with a larger one.
+
     Raises
     ------
     BadInput
-        If there is no module of a function.
+        If there is no module of a function, or no such site.
     """
     code = [source_hash_of(option, name) for option, name in functions.items() if name]
-    own = [asked.specification.key, asked.seed, *functions.values(), *code]
+    whole = asked.specification
+    own = [whole.key, whole.content, asked.seed, *functions.values(), *code]
     return {"run": msgspec.json.encode([__version__, *own, MECHANICS]).decode()}
 
 

@@ -68,6 +68,13 @@ class Specification(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             del own[name]
         return hashlib.sha256(msgspec.json.encode(own)).hexdigest()[:16]
 
+    @property
+    def content(self) -> str:
+        """Hash of all sites, including those of the corridors: they may be files that change."""
+        names = [*self.sites, *(site for road in self.corridors for site in road.sites)]
+        keys = [self.problem(name).key for name in names]
+        return hashlib.sha256(b"".join(keys)).hexdigest()[:16]
+
     def problem(self, site: str) -> DesignProblem:
         """Return the design problem of a site."""
         return DesignProblem(site, self.max_barriers)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from threading import Lock
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigdda import BadInput, Barrier, Layout, Site, check
 from rigdda.agents.designers import catalogue
+from rigdda.agents.designers.catalogue import CrossingEnsemble, seeds_by_event
 from rigdda.agents.designers.store import Ask, Store, StoredEvaluation
 from rigdda.app.exam.messages import (
     BatchReply,
@@ -28,18 +30,50 @@ from rigdda.barriers import to_tables
 from rigdda.envs import DesignProblem, Evaluation
 from rigdda.envs.observation import Arrays, observe
 from rigdda.envs.outcome_cache import fingerprint
-from rigdda.envs.problem import is_vector
+from rigdda.envs.problem import checked_seeds, is_vector
 from rigdda.seeds import release_seeds
 
 
 class Line(Protocol):
-    """Connection to the scorer; `used` is the number of releases simulated so far."""
-
-    used: int
+    """Connection to the scorer."""
 
     def ask(self, request: ReleaseRequest) -> BatchReply | CrossingsReply:
         """Return the reply to a request; `BadInput` if it is refused."""
         ...
+
+
+class Budget:
+    """Number of releases that may be simulated, and of those that were.
+
+    Parameters
+    ----------
+    releases : int
+        Number of releases that may be simulated.
+    whole : Budget, optional
+        Budget of which this one is a part: its releases are used as well.
+
+    Attributes
+    ----------
+    used : int
+        Number of releases used so far.
+    """
+
+    def __init__(self, releases: int, whole: Budget | None = None):
+        self.releases, self.used = releases, 0
+        self._whole, self._lock = whole, Lock()
+
+    @property
+    def left(self) -> int:
+        """Number of releases that may still be used, of this budget and of the whole."""
+        own = self.releases - self.used
+        return own if self._whole is None else min(own, self._whole.left)
+
+    def use(self, releases: int) -> None:
+        """Count releases that were simulated."""
+        with self._lock:
+            self.used += releases
+        if self._whole is not None:
+            self._whole.use(releases)
 
 
 class Task:
@@ -51,8 +85,8 @@ class Task:
         The design problem.
     name : str
         Name of the site.
-    budget : int
-        Number of releases that may be simulated.
+    budget : Budget
+        Budget of releases of the task.
     seed : int
         Seed of the task.
     line : Line
@@ -62,6 +96,8 @@ class Task:
 
     Attributes
     ----------
+    budget : int
+        Number of releases that may be simulated.
     rng : numpy.random.Generator
         Generator of random numbers, which depends on the seed and the task.
     """
@@ -70,15 +106,14 @@ class Task:
         self,
         problem: DesignProblem,
         name: str,
-        budget: int,
+        budget: Budget,
         seed: int,
         line: Line,
         section: int = 0,
     ):
-        self.problem, self.name, self.budget, self.seed = problem, name, budget, seed
-        self.rng = np.random.default_rng([seed, section, budget, *name.encode()])
-        self._line, self._section = line, section
-        self._begun = line.used
+        self.problem, self.name, self.budget, self.seed = problem, name, budget.releases, seed
+        self.rng = np.random.default_rng([seed, section, self.budget, *name.encode()])
+        self._budget, self._line, self._section = budget, line, section
 
     @property
     def site(self) -> Site:
@@ -102,13 +137,16 @@ class Task:
 
     @property
     def used(self) -> int:
-        """Number of releases used so far."""
-        return self._line.used - self._begun
+        """Number of releases used so far by this task and those that `within` made of it."""
+        return self._budget.used
 
     @property
     def left(self) -> int:
-        """Number of releases that may still be used."""
-        return self.budget - self.used
+        """Number of releases that may still be used.
+
+        It is limited by what is left of the corridor, or of the task of which `within` made this.
+        """
+        return self._budget.left
 
     def evaluate(
         self, layout: Sequence[Barrier] | ArrayLike, releases: int, start: int = 0
@@ -155,11 +193,12 @@ class Task:
         Raises
         ------
         BadInput
-            As `evaluate` does.
+            As `evaluate` does, and if the seeds are not distinct whole numbers.
         """
-        found = self._ask(to_tables(layout), list(seeds))
+        drawn = checked_seeds("seeds", seeds)
+        found = self._ask(to_tables(layout), list(drawn))
         assert isinstance(found, BatchReply)
-        return replace(found.batch.evaluation, layout=layout, seeds=tuple(seeds))
+        return replace(found.batch.evaluation, layout=layout, seeds=drawn)
 
     def sample(self, layout: Layout, seeds: Mapping[str, Sequence[int]]) -> StoredEvaluation:
         """Return releases of chosen events with a layout, which are counted.
@@ -167,24 +206,26 @@ class Task:
         Raises
         ------
         BadInput
-            As `evaluate` does, and if there is no such event.
+            As `evaluate` does, and if there is no such event, or the seeds of one are not distinct
+            whole numbers.
         """
-        found = self._ask(to_tables(layout), {name: list(own) for name, own in seeds.items()})
+        found = self._ask(to_tables(layout), _lists(seeds))
         assert isinstance(found, BatchReply)
         return replace(found.batch, evaluation=replace(found.batch.evaluation, layout=layout))
 
     def crossings(
         self, seeds: Mapping[str, Sequence[int]], stations: NDArray[np.float64]
-    ) -> catalogue.CrossingEnsemble:
+    ) -> CrossingEnsemble:
         """Return the crossings of stations in releases without barriers, which are counted.
 
         Raises
         ------
         BadInput
-            If more releases are requested than are left, or there is no such event.
+            If more releases are requested than are left, there are no seeds, there is no such
+            event, or the seeds of one are not distinct whole numbers.
         """
-        drawn, places = {name: list(own) for name, own in seeds.items()}, stations.tolist()
-        found = self._ask([], drawn, places)
+        places = stations.tolist()
+        found = self._ask([], _lists(seeds), places)
         assert isinstance(found, CrossingsReply)
         return found.ensemble(places)
 
@@ -196,18 +237,34 @@ class Task:
         if request.releases > self.left:
             hint = f"ask for at most the {self.left:,} that are left of {self.budget:,}"
             raise BadInput("releases", request.releases, hint)
-        return self._line.ask(request)
+        reply = self._line.ask(request)
+        self._budget.use(request.releases)
+        return reply
 
     def store(self) -> Store:
         """Return a store for `rigdda.agents` designers, whose evaluations the scorer computes."""
         return ScorerStore(self)
 
     def within(self, max_cost: float, releases: int) -> Task:
-        """Return the same task with a largest capital cost [EUR/m] and a budget of its own."""
+        """Return the same task with a largest capital cost [EUR/m] and a budget of its own.
+
+        The budget has at most the releases that are left. The releases of the new task are also
+        counted for this one.
+
+        Raises
+        ------
+        BadInput
+            If a number is outside its range.
+        """
         old = self.problem
         problem = DesignProblem(old.site, old.max_barriers, old.kinds, max_cost=max_cost)
-        most = min(releases, self.left)
-        return Task(problem, self.name, most, self.seed, self._line, self._section)
+        own = Budget(min(check.integer("releases", releases, 0), self.left), self._budget)
+        return Task(problem, self.name, own, self.seed, self._line, self._section)
+
+
+def _lists(seeds: Mapping[str, Sequence[int]]) -> dict[str, list[int]]:
+    """Return the checked seeds of each event as lists, which a message may contain."""
+    return {name: list(own) for name, own in seeds_by_event(seeds).items()}
 
 
 class ScorerStore(Store):
@@ -219,7 +276,7 @@ class ScorerStore(Store):
 
     def evaluate(self, problem: DesignProblem, layout: Layout, seeds: Sequence[int]) -> Evaluation:
         """Return the evaluation of a layout on release seeds."""
-        return self.task.on_seeds(layout, tuple(seeds))
+        return self.task.on_seeds(layout, seeds)
 
     def evaluate_many(self, asks: Sequence[Ask]) -> Iterator[Evaluation]:
         """Yield the evaluations of several layouts."""
@@ -231,6 +288,12 @@ class ScorerStore(Store):
     ) -> StoredEvaluation:
         """Return releases of some events with a layout."""
         return self.task.sample(layout, seeds)
+
+    def crossings(
+        self, site: Site, seeds: Mapping[str, Sequence[int]], stations: NDArray[np.float64]
+    ) -> CrossingEnsemble:
+        """Return the crossings of stations in releases without barriers."""
+        return self.task.crossings(seeds, stations)
 
 
 class CorridorTask:
@@ -263,22 +326,22 @@ class CorridorTask:
         self.money = float(order.money or 0.0)
         self.budget = order.budget * len(order.sites)
         self.rng = np.random.default_rng([order.seed, order.budget, *order.name.encode()])
-        self._line = line
+        self._budget = Budget(self.budget)
         problems = [DesignProblem(site, order.max_barriers) for site in order.sites]
         self.sections = tuple(
-            Task(problem, site, self.budget, order.seed, line, s)
+            Task(problem, site, Budget(self.budget, self._budget), order.seed, line, s)
             for s, (problem, site) in enumerate(zip(problems, order.sites, strict=True))
         )
 
     @property
     def used(self) -> int:
         """Number of releases used so far in all sections."""
-        return self._line.used
+        return self._budget.used
 
     @property
     def left(self) -> int:
         """Number of releases that may still be used."""
-        return self.budget - self.used
+        return self._budget.left
 
     def cost(self, layouts: Sequence[Sequence[Barrier]]) -> float:
         """Return the construction cost of one layout for each section [EUR]."""
@@ -291,7 +354,7 @@ def make_task(order: TaskOrder, line: Line) -> Task | CorridorTask:
     if order.money is not None:
         return CorridorTask(order, line)
     problem = DesignProblem(order.sites[0], order.max_barriers)
-    return Task(problem, order.name, order.budget, order.seed, line)
+    return Task(problem, order.name, Budget(order.budget), order.seed, line)
 
 
 SIMULATE = catalogue.ensemble
@@ -299,16 +362,17 @@ SIMULATE = catalogue.ensemble
 
 
 def count_crossings(tasks: Sequence[Task]) -> None:
-    """Count the releases without barriers that the designers of the package simulate for tasks.
+    """Count the releases without barriers that this package simulates on the sites of tasks.
 
-    The designers request these releases from the tasks. Releases of other sites, including those
-    of earlier tasks, are simulated without being counted.
+    They are requested from the tasks. Designers request them from the store of a task, see
+    `ScorerStore.crossings`; this function is for forecasts that are made without a designer.
+    Releases of other sites, including those of earlier tasks, are simulated without being counted.
     """
     known = {own.problem.key: own for own in tasks}
 
     def ask(
         site: Site, seeds: Mapping[str, Sequence[int]], stations: NDArray[np.float64]
-    ) -> catalogue.CrossingEnsemble:
+    ) -> CrossingEnsemble:
         task = known.get(fingerprint(site))
         return SIMULATE(site, seeds, stations) if task is None else task.crossings(seeds, stations)
 

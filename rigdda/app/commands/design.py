@@ -254,7 +254,8 @@ def _tell(done: DesignStudy, store: Store, folder: Path) -> None:
         finding(line)
     if done.frontier:
         show(report.frontier_table(done.problem.site, done.frontier))
-    from_start = " (a starting layout of the search)" if result.origin == "start" else ""
+    kept = result.origin == "start" and findings.was_searched(done) and len(result.tried) > 1
+    from_start = " (a starting layout of the search)" if kept else ""
     site = done.problem.site
     click.echo(f"layout{from_start}:" if chosen.layout else f"layout: {unchanged(site)}")
     for barrier in chosen.layout:

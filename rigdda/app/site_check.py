@@ -217,8 +217,9 @@ def _measured(source: Source) -> str:
     long, middle, short = sorted(source.edges, reverse=True)
     return (
         f", with edges of {long:g}, {middle:g} and {short:g} m; their volumes are "
-        f"{range_of((volumes.min(), volumes.max()))} m3, {_figures(volumes.mean())} m3 on average, "
-        "because outlines do not fill the box"
+        f"{range_of((volumes.min(), volumes.max()))} m3, {_figures(volumes.mean())} m3 on average: "
+        "a block is as long along the road as the root of its cross-section; the box has "
+        f"{_figures(math.prod(source.edges))} m3"
     )
 
 

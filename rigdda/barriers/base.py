@@ -405,9 +405,9 @@ def base_friction(
     """Return the thrust in the direction of x that makes a body slide on the ground [N/m].
 
     The friction is the least of those that the scene has between its surface `own` and each of the
-    surfaces under it, see `Scene.interface`. In a release of a site, a fill on bare rock has that
-    of blocks of rock on soil. The inclination of the base is positive where it falls in the
-    direction of x, see `sliding_angle`.
+    surfaces under it, see `Scene.interface`. In a release of a site, the friction of blocks of rock
+    on soil is used for a fill on bare rock. The inclination of the base is positive where it falls
+    in the direction of x, see `sliding_angle`.
     """
     assert scene.terrain is not None
     below = surfaces_below(scene.terrain, outline)

@@ -64,6 +64,9 @@ LENGTHS = (50.0, 300.0)
 LENGTH_DECIMALS = 1
 """Number of decimals to which the lengths of sections are rounded [m]."""
 
+LEAST_LENGTH = 0.1
+"""Least length of a section [m]."""
+
 CORRIDOR_FIELDS: dict[str, observation.Field] = {
     "length": observation.Field(1, 2.1, 0.25, "log10 of the length of the section [m]"),
     "metres": observation.Field(
@@ -477,16 +480,19 @@ def _places(site: Any) -> tuple[Corridor | None, tuple[Place, ...]]:
 
 
 def _lengths(value: Any) -> tuple[float, float]:
-    """Return the range of the lengths of sections, of which no draw is rounded to 0."""
+    """Return the range of the lengths of sections [m]."""
     low, high = _range("lengths", value)
-    if np.round(low, LENGTH_DECIMALS) == 0.0:
-        hint = "give a number, or two numbers [low, high], of at least 0.1 m"
+    if low < LEAST_LENGTH:
+        hint = f"give a number, or two numbers [low, high], of at least {LEAST_LENGTH:g} m"
         raise BadInput("lengths", value, hint)
     return low, high
 
 
 def _range(field: str, value: Any, zero: bool = False) -> tuple[float, float]:
-    """Return a range of positive numbers given as a pair or as one number, which may be `zero`."""
+    """Return a range of positive numbers given as a pair or as one number.
+
+    With `zero`, a single number may be 0.
+    """
     if isinstance(value, int | float | np.number):
         number = check.number(field, value, 0.0, 1e9, open_low=not zero)
         return number, number

@@ -16,6 +16,9 @@ from rigdda import check
 from rigdda.errors import BadInput
 from rigdda.rounding import chainage
 
+SAME_POINT = 1e-9
+"""Distance below which two points of the ground are the same [m]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Terrain:
@@ -42,7 +45,7 @@ class Terrain:
 
     def __init__(self, points: ArrayLike, surfaces: Sequence[str] | None = None):
         chain = check.points("terrain points", points, 2)
-        short = np.flatnonzero(np.hypot(*np.diff(chain, axis=0).T) < 1e-9)
+        short = np.flatnonzero(np.hypot(*np.diff(chain, axis=0).T) < SAME_POINT)
         if short.size:
             raise BadInput(
                 f"terrain points[{short[0] + 1}]",

@@ -2,7 +2,8 @@
 
 The corners of a block lie on an ellipse, which makes it convex, at angles that vary at random
 within `JITTER`. The outline of a measured block fills a face of its box. Natural blocks with given
-edges have half to two thirds of the mass of a full box, as have these outlines.
+edges have half to two thirds of the mass of a full box, as have these outlines in a cube. The mass
+of a flat block is too large, because its length along the road is the root of its cross-section.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from rigdda.fields import about, documented
 from rigdda.ground.barrier_zone import BarrierZone
 from rigdda.ground.prices import Consequences, Prices
 from rigdda.ground.surface import Interface, Surface
-from rigdda.ground.terrain import Roughness, Terrain
+from rigdda.ground.terrain import SAME_POINT, Roughness, Terrain
 from rigdda.model.block import Block
 from rigdda.model.existing import Existing
 from rigdda.model.forest import Forest
@@ -27,9 +27,6 @@ from rigdda.model.settings import LARGEST_DT, SHORTEST_DT, USUAL_DT, check_dampi
 from rigdda.model.source import Point, Source
 from rigdda.model.traffic import Traffic
 from rigdda.rounding import chainage
-
-SAME_POINT = 1e-9
-"""Distance below which two points of the ground are the same [m]; `Terrain` refuses such points."""
 
 
 @documented

@@ -14,6 +14,7 @@ from rigdda.errors import BadInput, DoubtfulInput
 from rigdda.geometry import overlap
 from rigdda.ground.prices import DITCHES
 from rigdda.ground.surface import check_friction
+from rigdda.ground.terrain import SAME_POINT
 from rigdda.model import loose_blocks
 from rigdda.model.settings import Settings
 from rigdda.model.site_tables import SiteTables
@@ -24,9 +25,6 @@ from rigdda.rounding import chainage
 LEAST_BEYOND = 30.0
 """Minimum length of the ground beyond the road [m], so that blocks that cross the road count as
 beyond before they reach the end of the ground."""
-
-SAME_POINT = 1e-9
-"""Distance below which two points of the ground are the same [m]."""
 
 MANY_STEPS, MANY_BLOCKS = 2e5, 3e3
 """Numbers of steps and blocks of a release that cause a warning. Releases of built-in sites take

@@ -178,6 +178,9 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if self.band is None or self.edges is not None:
                 hint = "leave it out: only blocks of a band without edges have a shape"
                 raise BadInput(f"{where}.shape", self.shape, hint)
+            if not left_out:
+                hint = "leave out it or one of corners and aspect: with both, it has no effect"
+                raise BadInput(f"{where}.shape", self.shape, hint)
             for name in left_out:
                 msgspec.structs.force_setattr(self, name, getattr(SHAPES[self.shape], name))
             msgspec.structs.force_setattr(self, "shape", None)

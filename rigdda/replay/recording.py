@@ -87,6 +87,9 @@ DOT = -3.0
 EDGE = 0.01
 """z offset of an outline above its fill [m]."""
 
+APPLICATION = "rigdda"
+"""Name of the application in recordings."""
+
 SKY: Colour = (233, 240, 246)
 GROUND_RGB: Colour = (201, 188, 165)
 BARRIER_RGB: Colour = (28, 90, 160)
@@ -173,6 +176,14 @@ PLOTS = {
     "potential_energy": ("potential energy [J]", (60, 130, 210)),
 }
 """Title and colour of every scalar."""
+
+
+def is_recording(path: str | os.PathLike[str]) -> bool:
+    """Return whether a file is a recording that this package wrote."""
+    try:
+        return any(found.application_id == APPLICATION for found in RrdReader(str(path)).recordings())
+    except (OSError, ValueError, RuntimeError):
+        return False
 
 
 def scalars(run: RecordedMotion, marks: Marks) -> dict[str, Floats]:
@@ -311,7 +322,7 @@ def recording(
 ) -> Iterator[rr.RecordingStream]:
     """Yield a separate recording stream, saved at `path` when the block ends without an error."""
     with atomic(rrd_path(path)) as part:
-        rec = rr.RecordingStream("rigdda", recording_id=uuid4())
+        rec = rr.RecordingStream(APPLICATION, recording_id=uuid4())
         try:
             rec.save(part, default_blueprint=blueprint)
             yield rec

@@ -143,11 +143,19 @@ STUDIES: dict[str, tuple[Callable[[], DesignStudy], str]] = {
     ),
     "a search that finds nothing although the rule saves": (
         lambda: study({"nothing": NOTHING, "rule": CHEAP, "optimised (race)": NOTHING}),
-        "Compare with 'rule' before you build nothing. 'rule' costs 31 EUR per metre and year less",
+        "Compare with 'rule' before you decide to build nothing. 'rule' costs 31 EUR per metre",
     ),
     "a rule that misses a target that the constant meets": (
         lambda: with_targets("missed", "met", "missed"),
         "Compare with 'constant' before you build: fence",
+    ),
+    "a rule that fails a check and misses a target that the constant meets": (
+        lambda: with_targets("missed", "met", "missed", table=(LOW,)),
+        "Compare with 'constant' before you build: fence",
+    ),
+    "a rule that misses a target that the slope meets": (
+        lambda: with_targets("met", "missed", "missed"),
+        "Do not build this: fence",
     ),
     "a rule that misses a target that nothing meets": (
         lambda: with_targets("missed", "missed", "missed"),
@@ -204,12 +212,17 @@ def test_a_better_layout_is_named_with_its_barriers() -> None:
         "5 % is missed with this layout and met with 'constant': ditch at 30.3 m, 1.0 m deep, "
         "3.0 m wide."
     )
+    assert headline(with_targets("met", "missed", "missed")).endswith(
+        " is missed with it and met without barriers."
+    )
+    fails = headline(with_targets("missed", "met", "missed", table=(LOW,)))
+    assert ". The layout that was found fails its checks: " in fails
     open_ = headline(study({
         "nothing": replace(NOTHING, targets="undecided"),
         "constant": replace(DEAR, targets="met"),
         "rule": replace(NOTHING, targets="undecided"),
     }, **REACH))  # fmt: skip
-    assert open_.startswith("Compare with 'constant' before you build nothing. The target that")
+    assert open_.startswith("Compare with 'constant' before you decide to build nothing. The")
     assert "is undecided without barriers and met with 'constant': fence at 17.0 m" in open_
 
 

@@ -159,14 +159,28 @@ def test_a_report_replaces_only_a_report(folder: Path) -> None:
     line = refused("report", "results", "--out", "pages", folder=folder)
     assert "report.html: this file is not a report of rigdda" in line.replace("'", "")
     assert (folder / "pages/report.html").read_text(encoding="utf-8") == "<p>mine</p>"
+    earlier = '<!doctype html><html><head><meta name="generator" content="rigdda 0.2.0">'
+    (folder / "pages/report.html").write_text(earlier, encoding="utf-8")
+    run("report", "results", "--out", "pages", folder=folder)
 
 
 def test_a_conversion_does_not_replace_a_replay(folder: Path) -> None:
     simulate(folder, "results")
     (folder / "results/run.rrd").write_text("mine", encoding="utf-8")
     line = refused("replay", "results/run.npz", folder=folder)
-    assert "run.rrd" in line and "move it away" in line
+    assert "run.rrd" in line and "move it away: it is not a replay of rigdda" in line
     assert (folder / "results/run.rrd").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_conversion_replaces_an_earlier_one(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[Path] = []
+    monkeypatch.setattr("rigdda.replay.viewer.open_viewer", opened.append)
+    simulate(folder, "results")
+    for _ in range(2):
+        run("replay", "results/run.npz", folder=folder)
+    assert [path.name for path in opened] == ["run.rrd"] * 2
 
 
 def test_a_study_of_a_site_with_rates_of_arrivals_converts_them(folder: Path) -> None:

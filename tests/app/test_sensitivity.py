@@ -282,7 +282,7 @@ def test_numbers_that_cannot_be_varied_are_named(capsys: pytest.CaptureFixture[s
     wide = with_volumes(volumes=(1e-6, size.high * 800.0), volume_shares=shares)
     assert "events.block.size" not in {one.path for one in choose(("sizes",), wide, ())}
     inputs(("sizes",), wide, ())
-    told = "events.block.size, of which the site permits no other value"
+    told = "events.block.size, which has no other valid value on this site"
     assert capsys.readouterr().out == f"note: not varied: {told}\n"
 
 

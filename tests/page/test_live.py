@@ -70,7 +70,7 @@ def test_rates_of_arrivals_are_converted_and_told_in_the_background(live):
     live.ask(ARRIVALS, LAYOUT)
     _wait(live, lambda found: found.releases == 50 and not found.doing)
     found = live.figures
-    assert (found.broken, found.fault, found.failure) == ((), "", "")
+    assert (found.broken, found.fault, found.error) == ((), "", "")
     (note,) = found.notes
     used = with_release_rates(ARRIVALS).events[0].rate
     assert used > ARRIVALS.events[0].rate
@@ -109,10 +109,10 @@ def test_a_rate_that_cannot_be_converted_does_not_blame_the_layout(live):
     with pytest.raises(BadInput, match="lower rate of arrivals"):
         with_release_rates(site)
     live.ask(site, LAYOUT)
-    _wait(live, lambda found: bool(found.failure))
+    _wait(live, lambda found: bool(found.error))
     found = live.figures
     assert (found.broken, found.fault, found.doing) == ((), "", "")
-    assert "lower rate of arrivals" in found.failure
+    assert "lower rate of arrivals" in found.error
     told = _rules(found, "red")
     assert "in the tab Slope" in told
     assert "figures cannot be computed" in told
@@ -125,8 +125,8 @@ def test_a_rate_that_cannot_be_converted_does_not_blame_the_layout(live):
 def test_an_impossible_layout_is_told_before_rates_are_converted(live, monkeypatch):
     monkeypatch.setattr(rates, "simulate", lambda site: pytest.fail("it converts rates"))
     live.ask(ARRIVALS, (Fence(500.0, 3.0, energy_class=1000),))
-    _wait(live, lambda found: bool(found.fault or found.failure))
-    assert live.figures.broken and live.figures.failure == ""
+    _wait(live, lambda found: bool(found.fault or found.error))
+    assert live.figures.broken and live.figures.error == ""
     assert "may not be built" in _rules(live.figures, "red")
 
 

@@ -39,7 +39,7 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     from rigdda.app.released import released
     from rigdda.app.reports import findings
     from rigdda.envs.replay_record import release_record
-    from rigdda.replay.recording import Marks
+    from rigdda.replay.recording import Marks, is_recording
     from rigdda.replay.viewer import open_viewer
 
     file = Path(target)
@@ -48,9 +48,8 @@ def replay(target: str, layout: str | None, event: str | None, seed: int, out: P
     if file.suffix == ".npz":
         run = rigdda.Run.load(file)
         file = file.with_suffix(".rrd")
-        if file.exists():
-            hint = f"open it with `rigdda replay {file}`, or move it away to convert {target} again"
-            raise BadInput("replay", str(file), hint)
+        if file.exists() and not is_recording(file):
+            raise BadInput("replay", str(file), "move it away: it is not a replay of rigdda")
         run.to_rerun(file, Marks(title=file.stem))
     if file.suffix == ".rrd":
         open_viewer(file)

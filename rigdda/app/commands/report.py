@@ -11,23 +11,27 @@ from rigdda.app.terminal import (
     folder_for,
 )
 
-GENERATOR = '<meta name="generator" content="rigdda">'
-"""Line of every report, by which it is told from a file of the user."""
+GENERATOR = '<meta name="generator" content="rigdda'
+"""Beginning of a line of every report, by which it is told from a file of the user."""
 
 
-def _check_own(file: Path) -> None:
-    """Check that a file of the name of the report is a report.
+def _check_own(page: Path, pdf: Path | None) -> None:
+    """Check that files of the names of a report and of its print belong to a report.
+
+    A print is taken as one of rigdda if there is a report beside it.
 
     Raises
     ------
     BadInput
-        If it is another file.
+        If one is another file.
     """
     from rigdda import BadInput
 
-    if file.is_file() and GENERATOR not in file.read_text("utf-8", "replace")[:1000]:
-        hint = "this file is not a report of rigdda: move it away or name another folder"
-        raise BadInput("--out", str(file), hint)
+    own = page.is_file() and GENERATOR in page.read_text("utf-8", "replace")[:1000]
+    for file in filter(None, (page, pdf)):
+        if file.is_file() and not own:
+            hint = "this file is not a report of rigdda: move it away or name another folder"
+            raise BadInput("--out", str(file), hint)
 
 
 @click.command()
@@ -56,7 +60,7 @@ def report(results: tuple[Path, ...], out: Path | None, pdf: bool, serve: bool) 
     page = html_report.compose(folders)
     files = (html_report.REPORT_FILE, "report.pdf") if pdf else (html_report.REPORT_FILE,)
     folder = folder_for(out or results[0], "", *files)
-    _check_own(folder / html_report.REPORT_FILE)
+    _check_own(folder / html_report.REPORT_FILE, folder / "report.pdf" if pdf else None)
     file = html_report.write_report(page, folder)
     click.echo(file)
     if program is not None:

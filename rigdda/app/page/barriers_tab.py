@@ -309,8 +309,8 @@ def _rules(found: LiveFigures, bad: str) -> str:
     items = "".join(f"<li>{html.escape(_named(line, found.layout))}</li>" for line in lines)
     listed = f"<ul style='margin:2px 0;padding-left:20px'>{items}</ul>"
     out = _alert("This layout may not be built:", listed, bad) if lines else ""
-    if found.failure:
-        out += _alert("The figures cannot be computed:", html.escape(found.failure), bad)
+    if found.error:
+        out += _alert("The figures cannot be computed:", html.escape(found.error), bad)
     return out
 
 
@@ -350,7 +350,7 @@ def alternatives_html(project: Project, live: Live) -> str:
 def _compared(found: LiveFigures | None) -> tuple[str, ...]:
     """Return the figures of an alternative in the table."""
     if found is None or found.costs is None:
-        told = "" if found is None else found.fault or found.failure
+        told = "" if found is None else found.fault or found.error
         told = told or "to be computed"
         return (told, "", "", "", "")
     c = found.costs

@@ -39,8 +39,8 @@ class LiveFigures(NamedTuple):
     """Siting rules that the layout breaks, with the reason."""
     fault: str = ""
     """Why the layout cannot stand or has no price; empty if nothing is wrong with it."""
-    failure: str = ""
-    """Why the computing ended, if it is not for the layout; empty if it did not."""
+    error: str = ""
+    """Why the figures could not be computed, if the layout is not the reason; otherwise empty."""
     notes: tuple[str, ...] = ()
     """How the rates of events were converted from those of arrivals."""
     doing: str = ""

@@ -144,11 +144,11 @@ class Live:
             try:
                 self._compute(site, layout, others, done)
             except Error as error:
-                self._show(done, LiveFigures(layout, 0, failure=str(error)))
+                self._show(done, LiveFigures(layout, 0, error=str(error)))
             except Exception as error:  # the thread lives as long as the page
                 traceback.print_exc()
                 words = f"{type(error).__name__}: {error}"
-                self._show(done, LiveFigures(layout, 0, failure=words))
+                self._show(done, LiveFigures(layout, 0, error=words))
 
     def _show(self, generation: int, figures: LiveFigures) -> None:
         with self._wake:
@@ -189,7 +189,7 @@ class Live:
         try:
             released = self._release_rates(site, shown, generation)
         except Error as error:
-            self._show(generation, shown._replace(failure=str(error), doing=""))
+            self._show(generation, shown._replace(error=str(error), doing=""))
             return
         if released is None:
             return

@@ -143,8 +143,8 @@ def _room_for_band(site: Site, reach: float) -> tuple[float, float]:
     low, high = max([*gaps, (free, last)], key=lambda gap: gap[1] - gap[0])
     if high - low < LEAST_ROOM:
         hint = (
-            "make room for it: no part of the slope is free of bands and existing barriers where "
-            "its blocks can lie"
+            "make room for it: no part of the slope above its toe that is free of bands and "
+            "existing barriers is long enough for its blocks"
         )
         raise BadInput("new source band", None, hint)
     third = (high - low) / 3.0

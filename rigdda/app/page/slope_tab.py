@@ -452,8 +452,12 @@ class SlopeTab:
             for k, words in enumerate(("Least", "Greatest"))
         ]  # fmt: skip
         self._bound += volumes
+        event = self.project.site.events[i]
+        power_law = event.volume_median is None and not event.volumes
+        exponent = ("events", i, "exponent")
         shape = [
-            self._number("Exponent of volumes [-]", ("events", i, "exponent"), step=0.1, width=150),
+            *([self._number("Exponent of volumes [-]", exponent, step=0.1, width=150)]
+              if power_law else []),
             number(
                 "Longest over broadest [-]",
                 partial(_value, self.project, ("sources", place, "aspect", 1)),

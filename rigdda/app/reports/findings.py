@@ -152,6 +152,7 @@ def headline(answer: DesignAnswer) -> str:
     within = "" if answer.cap is None else f" for at most {euros(answer.cap)} EUR per metre"
     better = better_layout(answer)
     if better is not None and (answer.targets == MISSED or not fails):
+        fails = fails.replace("It fails", "The layout that was found fails", 1)
         return f"{_comparison(answer, better)}{fails}"
     if answer.targets == MISSED:
         none = f"No layout that was found{within} meets the target that {answer.asked}."
@@ -225,7 +226,7 @@ def better_layout(answer: DesignAnswer) -> OtherLayout | None:
 
 def _comparison(answer: DesignAnswer, better: OtherLayout) -> str:
     """Return a first line that names a better layout than the one found."""
-    this = f": {answer.layout}" if answer.layout else " nothing"
+    this = f"you build: {answer.layout}" if answer.layout else "you decide to build nothing"
     what = f"{better.name!r} costs {euros(answer.z[0] - better.z[0])} EUR per metre and year less"
     if TARGET_RANK[better.targets] < TARGET_RANK[answer.targets]:
         where = "with this layout" if answer.layout else answer.bare
@@ -233,7 +234,12 @@ def _comparison(answer: DesignAnswer, better: OtherLayout) -> str:
             f"The target that {answer.asked} is {answer.targets} {where} and {better.targets} with "
             f"{better.name!r}"
         )
-    return f"Compare with {better.name!r} before you build{this}. {what}: {better.barriers}."
+        if better is answer.others[0]:
+            return (
+                f"Do not build this: {answer.layout}. The target that {answer.asked} is "
+                f"{answer.targets} with it and {better.targets} {answer.bare}."
+            )
+    return f"Compare with {better.name!r} before {this}. {what}: {better.barriers}."
 
 
 def _left(answer: DesignAnswer) -> str:

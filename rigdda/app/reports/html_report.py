@@ -146,7 +146,7 @@ def summary_section(folders: Folders) -> Iterator[Block]:
         yield from _titled([*_design_blocks(folder)], f"Design in {folder.label}", many)
     for label, line in answers.items():
         if line is not None:
-            yield from _titled([_first_line(line)], f"Other values in {label}", many)
+            yield from _titled([_first_line(line)], f"Design with other values in {label}", many)
     passing = [block for f in folders if f.files("stations.csv") for block in _passing(f)]
     yield from _titled(passing, "What comes down", bool(designs))
     site = _site_of(folders)

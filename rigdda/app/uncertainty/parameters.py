@@ -174,7 +174,7 @@ def plausible(site: Site, layout: Layout) -> dict[str, tuple[Parameter, ...]]:
     """Return the uncertain numbers of a site with a layout by `GROUPS`.
 
     Numbers without influence are left out: rates and costs of 0, and prices without barriers. So
-    are numbers of which the site permits no other value, see `unvaried`. Barriers that stand
+    are numbers that have no other valid value on this site, see `unvaried`. Barriers that stand
     already have prices, too, for upkeep and repair.
     """
     groups = _assumed(site, layout)
@@ -201,7 +201,7 @@ def unvaried(names: Sequence[str], site: Site, layout: Layout) -> list[str]:
         if "sizes" in asked
     ]
     fixed = [one.path for name in asked for one in groups[name] if not _varies(one)]
-    return found + [f"{path}, of which the site permits no other value" for path in fixed]
+    return found + [f"{path}, which has no other valid value on this site" for path in fixed]
 
 
 NARROWEST = 1e-6
@@ -216,7 +216,7 @@ def _varies(one: Parameter) -> bool:
 def _assumed(site: Site, layout: Layout) -> dict[str, tuple[Parameter, ...]]:
     """Return the uncertain numbers of a site by `GROUPS`, with the ranges that it permits.
 
-    The limits of a number of which the site permits no other value are equal but for rounding.
+    The limits of a number that has no other valid value on the site are equal but for rounding.
     """
     sizes = [_factor(f"events.{e.name}.size", 1.0, "size") for e in site.events if e.area]
     sized = (s for s in site.sources if s.edges is not None or s.polygon)

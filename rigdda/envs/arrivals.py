@@ -124,8 +124,18 @@ def _chance(site: Site, event: str) -> Estimate:
     count = LEAST_RELEASES
     while True:
         outcomes = bare_outcomes(site, {event: count})[event]
-        chance = estimate(sum(outcome.reached for outcome in outcomes), count)
-        p = chance.probability
-        if count >= MOST_RELEASES or (p > 0.0 and math.sqrt((1.0 - p) / (p * count)) <= ENOUGH):
-            return chance
+        reached = sum(outcome.reached for outcome in outcomes)
+        if suffices(reached, count):
+            return estimate(reached, count)
         count *= 2
+
+
+def suffices(reached: int, releases: int) -> bool:
+    """Return whether the share of releases that reach the road is known well enough.
+
+    It is if its relative standard error is at most `ENOUGH`, or after `MOST_RELEASES`.
+    """
+    if releases >= MOST_RELEASES:
+        return True
+    share = reached / releases
+    return share > 0.0 and math.sqrt((1.0 - share) / (share * releases)) <= ENOUGH

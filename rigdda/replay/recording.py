@@ -181,7 +181,8 @@ PLOTS = {
 def is_recording(path: str | os.PathLike[str]) -> bool:
     """Return whether a file is a recording that this package wrote."""
     try:
-        return any(found.application_id == APPLICATION for found in RrdReader(str(path)).recordings())
+        found = RrdReader(str(path)).recordings()
+        return any(recording.application_id == APPLICATION for recording in found)
     except (OSError, ValueError, RuntimeError):
         return False
 

@@ -21,7 +21,7 @@ from rigdda.app.exam.messages import (
     Tables,
     TaskOrder,
 )
-from rigdda.app.exam.task import Budget, Task, count_crossings
+from rigdda.app.exam.task import ReleaseBudget, Task, count_crossings
 from rigdda.barriers import from_table
 from rigdda.envs import DesignProblem
 
@@ -146,6 +146,6 @@ def practice(site: str, budget: int = 500, seed: int = 0, max_barriers: int = 3)
     releases = check.integer("budget", budget, 0)
     counter = ReleaseCounter([problem], releases)
     number = check.integer("seed", seed, 0, SEED)
-    task = Task(problem, str(site), Budget(releases), number, counter)
+    task = Task(problem, str(site), ReleaseBudget(releases), number, counter)
     count_crossings([task])
     return task

@@ -42,14 +42,14 @@ class Line(Protocol):
         ...
 
 
-class Budget:
+class ReleaseBudget:
     """Number of releases that may be simulated, and of those that were.
 
     Parameters
     ----------
     releases : int
         Number of releases that may be simulated.
-    whole : Budget, optional
+    whole : ReleaseBudget, optional
         Budget of which this one is a part: its releases are used as well.
 
     Attributes
@@ -58,7 +58,7 @@ class Budget:
         Number of releases used so far.
     """
 
-    def __init__(self, releases: int, whole: Budget | None = None):
+    def __init__(self, releases: int, whole: ReleaseBudget | None = None):
         self.releases, self.used = releases, 0
         self._whole, self._lock = whole, Lock()
 
@@ -85,7 +85,7 @@ class Task:
         The design problem.
     name : str
         Name of the site.
-    budget : Budget
+    allowance : ReleaseBudget
         Budget of releases of the task.
     seed : int
         Seed of the task.
@@ -106,14 +106,15 @@ class Task:
         self,
         problem: DesignProblem,
         name: str,
-        budget: Budget,
+        allowance: ReleaseBudget,
         seed: int,
         line: Line,
         section: int = 0,
     ):
-        self.problem, self.name, self.budget, self.seed = problem, name, budget.releases, seed
+        self.problem, self.name, self.seed = problem, name, seed
+        self.budget = allowance.releases
         self.rng = np.random.default_rng([seed, section, self.budget, *name.encode()])
-        self._budget, self._line, self._section = budget, line, section
+        self._budget, self._line, self._section = allowance, line, section
 
     @property
     def site(self) -> Site:
@@ -246,9 +247,9 @@ class Task:
         return ScorerStore(self)
 
     def within(self, max_cost: float, releases: int) -> Task:
-        """Return the same task with a largest capital cost [EUR/m] and a budget of its own.
+        """Return the same task with a largest capital cost [EUR/m] and a part of its budget.
 
-        The budget has at most the releases that are left. The releases of the new task are also
+        The part has at most the releases that are left. The releases of the new task are also
         counted for this one.
 
         Raises
@@ -258,7 +259,7 @@ class Task:
         """
         old = self.problem
         problem = DesignProblem(old.site, old.max_barriers, old.kinds, max_cost=max_cost)
-        own = Budget(min(check.integer("releases", releases, 0), self.left), self._budget)
+        own = ReleaseBudget(min(check.integer("releases", releases, 0), self.left), self._budget)
         return Task(problem, self.name, own, self.seed, self._line, self._section)
 
 
@@ -326,10 +327,10 @@ class CorridorTask:
         self.money = float(order.money or 0.0)
         self.budget = order.budget * len(order.sites)
         self.rng = np.random.default_rng([order.seed, order.budget, *order.name.encode()])
-        self._budget = Budget(self.budget)
+        self._budget = ReleaseBudget(self.budget)
         problems = [DesignProblem(site, order.max_barriers) for site in order.sites]
         self.sections = tuple(
-            Task(problem, site, Budget(self.budget, self._budget), order.seed, line, s)
+            Task(problem, site, ReleaseBudget(self.budget, self._budget), order.seed, line, s)
             for s, (problem, site) in enumerate(zip(problems, order.sites, strict=True))
         )
 
@@ -354,7 +355,7 @@ def make_task(order: TaskOrder, line: Line) -> Task | CorridorTask:
     if order.money is not None:
         return CorridorTask(order, line)
     problem = DesignProblem(order.sites[0], order.max_barriers)
-    return Task(problem, order.name, Budget(order.budget), order.seed, line)
+    return Task(problem, order.name, ReleaseBudget(order.budget), order.seed, line)
 
 
 SIMULATE = catalogue.ensemble

@@ -7,7 +7,6 @@ site changes. They are stored on disk: no thread and no command simulates them a
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -15,13 +14,7 @@ from typing import NamedTuple
 from rigdda import BadInput, Site
 from rigdda.app.page.portions import FIRST, next_size
 from rigdda.app.released import in_words
-from rigdda.envs.arrivals import (
-    ENOUGH,
-    LEAST_RELEASES,
-    MOST_RELEASES,
-    release_rates,
-    with_release_rates,
-)
+from rigdda.envs.arrivals import LEAST_RELEASES, release_rates, suffices, with_release_rates
 from rigdda.envs.ensemble import bare_outcomes
 from rigdda.model.site_tables import ARRIVAL
 
@@ -53,16 +46,8 @@ def _simulate(site: Site, event: str) -> Iterator[str]:
         outcomes = bare_outcomes(site, {event: done})[event]
         size = next_size(size, time.monotonic() - start)
         yield f"computing the rate of {event} from {done:,} releases without new barriers"
-        if done == wanted and not _suffices(sum(one.reached for one in outcomes), done):
+        if done == wanted and not suffices(sum(one.reached for one in outcomes), done):
             wanted *= 2
-
-
-def _suffices(count: int, releases: int) -> bool:
-    """Return whether so many arrivals in so many releases give their share well enough."""
-    if releases >= MOST_RELEASES:
-        return True
-    share = count / releases
-    return share > 0.0 and math.sqrt((1.0 - share) / (share * releases)) <= ENOUGH
 
 
 def released(site: Site) -> Released:

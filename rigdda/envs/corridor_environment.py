@@ -61,11 +61,8 @@ BUDGETS = (30.0, 1600.0)
 LENGTHS = (50.0, 300.0)
 """Range of the lengths of sections [m]."""
 
-LENGTH_DECIMALS = 1
-"""Number of decimals to which the lengths of sections are rounded [m]."""
-
 LEAST_LENGTH = 0.1
-"""Least length of a section [m]."""
+"""Least length of a section, to which lengths are rounded [m]."""
 
 CORRIDOR_FIELDS: dict[str, observation.Field] = {
     "length": observation.Field(1, 2.1, 0.25, "log10 of the length of the section [m]"),
@@ -282,7 +279,7 @@ class CorridorDesign(LayoutEnv):
             )
         chosen = rng.choice(len(self._names), self.sections, replace=False).tolist()
         drawn = rng.uniform(*self._lengths, size=self.sections)
-        lengths = np.round(drawn, LENGTH_DECIMALS).tolist()
+        lengths = np.round(drawn, 1).tolist()
         problems = [self._sites.problem_of(self._names[i]) for i in chosen]
         return tuple(
             PlacedSection(problem, length, problem.site.name)

@@ -159,6 +159,7 @@ def design(
     folder = folder_for(out, f"design-{problem.site.name}", *files)
     with recorded_run(folder, problem.site):
         record_problem(folder, problem, *report.DESIGN_FILES)
+        remove_results(folder, report.BAND_FILES)
         total = job.search_budget(problem, designer, budget) + CASES * verify
         with interim(total) as (tick, show_interim):
             done, store = job.design(
@@ -170,7 +171,6 @@ def design(
             )  # fmt: skip
             tick(total, "pictures")
             report.write_design(done, folder, seed)
-        remove_results(folder, report.BAND_FILES)
         band = _on_other_grounds(done, grounds, fitted, seed, folder) if grounds else None
     _tell(done, store, folder)
     if band is not None:

@@ -1,4 +1,7 @@
-"""Portions of releases: a thread looks after each of them whether it has something else to do."""
+"""Portions of releases, after each of which a thread checks whether it has something else to do.
+
+They are apart from `rates`, whose imports would delay the opening of the page.
+"""
 
 from __future__ import annotations
 

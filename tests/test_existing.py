@@ -231,6 +231,18 @@ def test_layouts_with_removals_are_encoded() -> None:
 
 
 @pytest.mark.parametrize(
+    ("barrier", "words"),
+    [
+        (Removal(20.0), "removal of the existing barrier at x = 20.0 m"),
+        (Ditch(12.0, 1.0, 2.0), "ditch 1.0 m deep, 2.0 m wide at x = 12.0 m"),
+        (Mesh(5.0, "spot"), "mesh: spot"),
+    ],
+)
+def test_a_barrier_and_its_place_are_named_once(barrier: rigdda.Barrier, words: str) -> None:
+    assert barrier.label_and_place == words
+
+
+@pytest.mark.parametrize(
     "name",
     [*(pytest.param(n, marks=pytest.mark.slow) for n in ("race", "rule")), "random", "constant"],
 )

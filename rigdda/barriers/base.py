@@ -268,6 +268,11 @@ class Barrier(msgspec.Struct, frozen=True, tag_field="kind", forbid_unknown_fiel
         """Kind, class and main dimension in words, for the label in an image."""
         raise NotImplementedError
 
+    @property
+    def label_and_place(self) -> str:
+        """Label and chainage in words."""
+        return f"{self.label} at x = {self.x:.1f} m"
+
     def order(self, road: float) -> tuple[str, str]:
         """Return what a specification adds to `label`: dimensions and notes on the location.
 

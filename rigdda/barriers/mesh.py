@@ -50,6 +50,11 @@ class Mesh(Barrier, frozen=True, tag="mesh"):
         """Kind and option in words."""
         return f"mesh: {self.option}"
 
+    @property
+    def label_and_place(self) -> str:
+        """Kind and option in words: the option says where the mesh is."""
+        return self.label
+
     def left_height(self, displacement: float) -> float:
         """Return 0: mesh has no height [m]."""
         return 0.0

@@ -7,7 +7,6 @@ from typing import Annotated, ClassVar
 
 from rigdda.barriers.base import Barrier, Floats, KnownSite
 from rigdda.fields import about, documented
-from rigdda.rounding import chainage
 
 
 @documented
@@ -43,7 +42,7 @@ class Removal(Barrier, frozen=True, tag="removal"):
     @property
     def label(self) -> str:
         """What is done, in words."""
-        return f"removal of the barrier at {chainage(self.x)} m"
+        return "removal of the existing barrier"
 
     def left_height(self, displacement: float) -> float:
         """Return 0: nothing stands [m]."""

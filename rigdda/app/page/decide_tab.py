@@ -312,4 +312,4 @@ class DecideTab:
 
 def _words(one: Tried) -> str:
     """Return the barriers of a layout in words, with their chainages."""
-    return "; ".join(f"{b.label} at {b.x:.1f} m" for b in one.layout) or "no barrier"
+    return "; ".join(b.label_and_place for b in one.layout) or "no barrier"

@@ -251,8 +251,8 @@ def words(layout: rigdda.Layout, site: rigdda.Site) -> str:
 
 def _placed(barrier: rigdda.Barrier, site: rigdda.Site) -> str:
     """Return kind, sizes and chainage of a barrier as text."""
-    if not isinstance(barrier, Built):  # its label says where it is
-        return barrier.label
+    if not isinstance(barrier, Built):
+        return barrier.label_and_place
     sizes, _ = barrier.order(site.road.start)
     return ", ".join(filter(None, (barrier.label, sizes, f"at x = {barrier.x:.1f} m")))
 

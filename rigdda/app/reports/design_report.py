@@ -86,7 +86,7 @@ def interim_table(cases: Sequence[VerifiedLayout]) -> Table:
 
 def _interim_labels(case: VerifiedLayout) -> str:
     """Return the barriers of a layout in words."""
-    return ", ".join(f"{b.label} at {b.x:.1f} m" for b in case.evaluation.layout)
+    return ", ".join(b.label_and_place for b in case.evaluation.layout)
 
 
 Row = dict[str, Any]
@@ -376,7 +376,7 @@ def frontier_table(site: Site, front: Sequence[TriedLayout]) -> Table:
 
 def brief(site: Site, layout: Layout) -> str:
     """Return the kinds and chainages of a layout in words."""
-    return " + ".join(f"{b.label} at {b.x:.1f}" for b in layout) or unchanged(site)
+    return " + ".join(b.label_and_place for b in layout) or unchanged(site)
 
 
 def draw_frontier(path: Path, problem: DesignProblem, front: Sequence[TriedLayout]) -> None:

@@ -529,7 +529,7 @@ def compliance(done: DesignStudy) -> str:
     faults = [f"fails its checks ({failed_words(failed)})"] if failed else []
     if TARGET_RANK[free.targets] > TARGET_RANK[chosen.targets]:
         faults.append(f"has targets that are {free.targets}")
-    built = " and ".join(f"{b.label} at x = {b.x:.1f} m" for b in free.layout) or "no barrier"
+    built = " and ".join(b.label_and_place for b in free.layout) or "no barrier"
     but = f", which {' and '.join(faults)}" if faults else ""
     found = f"without required checks, the search finds {built}{but}"
     z = (

@@ -49,8 +49,8 @@ Value = bool | int | float | str | Mapping[str, Any]
 PERIOD, LENGTH = "return_period", "section_length"
 """Keys of an event that are read as its rate; the second is the length that the first refers to."""
 
-EVENT_KEYS = (*NO_EVENT_MOTION, PERIOD, LENGTH)
-"""Keys of an event that do not affect its releases."""
+EVENT_KEYS = (*(key for key in NO_EVENT_MOTION if key != "rate_of"), PERIOD, LENGTH)
+"""Keys of an event that need no new releases; another meaning of a rate needs them."""
 
 MOTION = (
     "existing",
@@ -196,6 +196,8 @@ def _named(site: Site, path: str, value: Value, top: str) -> tuple[int, list[str
     keys = rest[len(name) + 1 :].split(".") if rest != name else []
     if not keys:
         raise BadInput(path, value, f"add a key, such as {top}.{name}.KEY=VALUE")
+    if keys[0] == "name":
+        raise BadInput(path, value, "leave it out: the layouts of the design refer to this name")
     if top == "events":
         known_keys = type(site.events[0]).__struct_fields__
         if keys[0] in known_keys and keys[0] not in EVENT_KEYS:
@@ -445,8 +447,9 @@ def failed_checks(
 ) -> tuple[BarrierCheck, ...]:
     """Return the checks that the new barriers of a layout do not meet.
 
-    The demand is that of the slope as it stands. Only for the layout that the design found, it is
-    that below the other barriers, as in the design, which has stored it.
+    The demand is that of the slope with the existing barriers that the layout keeps. Only for the
+    layout that the design found, it is that below the other barriers, as in the design, which has
+    stored it.
 
     Parameters
     ----------
@@ -467,7 +470,9 @@ def failed_checks(
         free = DesignProblem(problem.site, kept.max_barriers, kept.kinds, zone=kept.zone)
         return tuple(check for check in check_layout(free, layout).failed if not check.existing)
     return tuple(
-        check for barrier in standing(layout) for check in problem.place.failed_checks(barrier)
+        check
+        for barrier in standing(layout)
+        for check in problem.place.failed_checks(barrier, layout)
     )
 
 

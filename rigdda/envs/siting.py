@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Iterator, Sequence
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -21,6 +20,7 @@ from rigdda.envs.barrier_formulas import BarrierCheck, checks_of
 from rigdda.envs.design_envelope import DesignEnvelope
 from rigdda.envs.fence_checks import demand_at
 from rigdda.ground.barrier_zone import BarrierZone
+from rigdda.model.existing import remaining
 from rigdda.rounding import chainage
 
 
@@ -66,7 +66,8 @@ class Rules:
         Largest capital cost of a layout [EUR per metre of road].
     checks : {"reported", "required"}
         Whether every barrier must satisfy the checks of `rigdda.envs.barrier_formulas`. The demand
-        on a barrier is that of the slope as it stands, without the other new barriers.
+        on a barrier is that of the slope with the existing barriers that the layout keeps, without
+        the other new barriers.
 
     Attributes
     ----------
@@ -89,7 +90,8 @@ class Rules:
         checks: str = "reported",
     ):
         self.site, self.zone, self.max_cost, self.checks = site, zone, max_cost, checks
-        self._failed: dict[Barrier, tuple[BarrierCheck, ...]] = {}
+        self._failed: dict[tuple[Barrier, Layout], tuple[BarrierCheck, ...]] = {}
+        self._envelopes: dict[Layout, DesignEnvelope] = {}
         cut = [(max(low, zone.start), min(high, zone.end)) for low, high in site.rooms]
         self.parts = [(low, high) for low, high in cut if low < high]
         if not self.parts:
@@ -168,7 +170,7 @@ class Rules:
             except BadInput as bad:
                 yield bad
             if not isinstance(barrier, Mesh | Removal):
-                works = yield from self._faults(where, barrier)
+                works = yield from self._faults(where, barrier, barriers)
                 if works is not None:
                     rooms.append((where, barrier, occupied(barrier, works)))
         if sum(isinstance(barrier, Mesh) for barrier in barriers) > 1:
@@ -235,7 +237,7 @@ class Rules:
         BadInput
             If it is not feasible; the message begins with `where`.
         """
-        faults = self._faults(where, barrier)
+        faults = self._faults(where, barrier, (barrier,))
         try:
             fault = next(faults)
         except StopIteration as end:
@@ -243,10 +245,12 @@ class Rules:
             return works
         raise fault
 
-    def _faults(self, where: str, barrier: Barrier) -> Generator[BadInput, None, Span | None]:
+    def _faults(
+        self, where: str, barrier: Barrier, layout: Layout
+    ) -> Generator[BadInput, None, Span | None]:
         """Yield an error for each rule that a barrier violates; return its works if it can stand.
 
-        The barrier is not a mesh.
+        The barrier is not a mesh. It is one of the layout.
         """
         yield from self._wrong_sizes(where, barrier)
         try:
@@ -263,42 +267,55 @@ class Rules:
                 yield BadInput(f"{where}: {bad.field}", bad.value, bad.hint)
                 return None
         if self.checks == "required":
-            yield from self._failed_checks(where, barrier)
+            yield from self._failed_checks(where, barrier, layout)
         return start, end
 
-    def failed_checks(self, barrier: Barrier) -> tuple[BarrierCheck, ...]:
-        """Return the checks that a barrier does not meet.
+    def failed_checks(self, barrier: Barrier, layout: Layout) -> tuple[BarrierCheck, ...]:
+        """Return the checks that a barrier of a layout does not meet.
 
-        The demand is that of the slope as it stands, without other new barriers. It is simulated if
-        it is not stored.
+        The demand is that of the slope with the existing barriers that the layout neither removes
+        nor replaces, without other new barriers. It is simulated if it is not stored.
 
         Raises
         ------
         Diverged
             If a simulation diverges.
         """
-        if barrier not in self._failed:
+        kept = self._kept(layout)
+        known = barrier, kept
+        if known not in self._failed:
             if len(self._failed) >= MOST_KNOWN:
                 self._failed.clear()
-            demand = demand_at(self._envelope, self.site.rule, barrier.x)
+            demand = demand_at(self._envelope(kept), self.site.rule, barrier.x)
             found = checks_of(self.site, barrier, demand)
-            self._failed[barrier] = tuple(check for check in found if not check.satisfied)
-        return self._failed[barrier]
+            self._failed[known] = tuple(check for check in found if not check.satisfied)
+        return self._failed[known]
 
-    def _failed_checks(self, where: str, barrier: Barrier) -> Iterator[BadInput]:
-        """Yield an error if a barrier fails a check of its kind."""
-        for failed in self.failed_checks(barrier)[:1]:
+    def _failed_checks(self, where: str, barrier: Barrier, layout: Layout) -> Iterator[BadInput]:
+        """Yield an error if a barrier of a layout fails a check of its kind."""
+        for failed in self.failed_checks(barrier, layout)[:1]:
             hint = (
                 f"satisfy the check of {failed.check}, {failed.demand:.4g} of "
                 f"{failed.capacity:.4g} {failed.unit}, or report the checks only"
             )
             yield BadInput(where, barrier.label, hint)
 
-    @cached_property
-    def _envelope(self) -> DesignEnvelope:
-        """What the blocks of the design events do on the slope as it stands."""
-        kept = sorted(self.site.standing(()), key=lambda barrier: barrier.x)
-        return design_envelope.of(self.site, self.zone, layout=kept)
+    def _kept(self, layout: Layout) -> Layout:
+        """Return the existing barriers that a layout neither removes nor replaces, downhill.
+
+        They are all existing barriers if the layout may not be built beside them.
+        """
+        try:
+            kept = remaining(self.site.existing, self.site.profile, layout)
+        except BadInput:
+            kept = self.site.existing_barriers
+        return tuple(sorted(kept, key=lambda barrier: barrier.x))
+
+    def _envelope(self, kept: Layout) -> DesignEnvelope:
+        """Return what the blocks of the design events do beside these existing barriers."""
+        if kept not in self._envelopes:
+            self._envelopes[kept] = design_envelope.of(self.site, self.zone, layout=kept)
+        return self._envelopes[kept]
 
     def _on_steep_ground(
         self, where: str, barrier: Barrier, start: float, end: float

@@ -105,8 +105,9 @@ class Existing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     removable: Annotated[
         bool,
         about(
-            "Whether it may be removed. A new barrier that stands in its place or within 0.5 m "
-            "replaces it. No new barrier may stand there if it is not removable."
+            "Whether it may be removed. A new barrier that stands in its place or within 0.5 m, "
+            "including the elongation of a fence, replaces it. No new barrier may stand there if "
+            "it is not removable."
         ),
     ] = False
     removal: Annotated[

@@ -178,12 +178,6 @@ def test_layouts_that_miss_a_target_rank_behind() -> None:
     assert score(problem, few)[0] == 0.0 < final_score(problem, few)[0]
 
 
-def test_the_best_so_far_never_rises(valley: Valley) -> None:
-    at, best = design("random", valley, 300).history.best_so_far()
-    assert len(at) == len(best) > 10
-    assert (np.diff(at) > 0).all() and (np.diff(best) <= 0).all()
-
-
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize(
     "simulations, seed",

@@ -152,6 +152,7 @@ def test_without_changes_it_is_the_table_of_the_design(designed: Path) -> None:
         assert (float(row["objective"]), float(row["cost"])) == (e.objective, e.cost)
         assert (float(row["objective_low"]), float(row["objective_high"])) == e.ci
         assert float(row["debris_share"]) == e.debris_share
+    assert reprice_report.rows(done)[0]["debris_share"] == 1.0  # as in the printed table
     # None meets the target, so one of the verified layouts is chosen, with those of the frontier.
     verified = {r["barriers"] for r in table if r["stage"] in ("verification", "frontier")}
     assert json.dumps(to_tables(done.chosen.evaluation.layout)) in verified
@@ -267,6 +268,9 @@ def test_a_return_period_is_compared_on_the_same_length(designed: Path) -> None:
         assert words.startswith(f"{path} = 4 years on 180 m of slope (was ")
     with pytest.raises(BadInput, match="return_period"):
         reprice.with_settings(kept.site, {"events.block.rate": 1.0, path: 4.0})
+    for key, value in (("rate_of", "arrival"), ("name", "other")):
+        with pytest.raises(BadInput, match=f"events.block.{key}"):
+            reprice.with_settings(kept.site, {f"events.block.{key}": value})
 
 
 def test_the_command_answers_in_a_folder_of_its_own(designed: Path, tmp_path: Path) -> None:

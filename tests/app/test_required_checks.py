@@ -11,6 +11,7 @@ from rigdda.agents.designers.menu import Menu
 from rigdda.app.barrier_checks import check_layout
 from rigdda.app.reports import findings
 from rigdda.app.reports.findings import DesignAnswer, FailedCheck, headline
+from rigdda.barriers import Removal
 from rigdda.envs import DesignProblem, design_envelope
 from rigdda.envs.barrier_formulas import checks_of
 from rigdda.envs.environments import BarrierDesign
@@ -48,6 +49,19 @@ def test_all_that_may_be_built_meets_its_checks() -> None:
         ]
         assert menu.singles(kind) == sound
         assert kind != "fence" or 0 < len(sound) < len(free)
+
+
+def test_the_demand_is_that_without_existing_barriers_that_a_layout_removes() -> None:
+    strong = Existing("fence", 21.0, 6.0, energy_class=5000, removable=True, removal=40.0)
+    site = replace(Site.load("old-fence"), existing=(strong,))
+    problem = DesignProblem(site, checks="required")
+    below = Fence(24.0, 2.0, energy_class=100)
+    replacing = Fence(21.0, 2.0, energy_class=100)
+    assert not problem.fits((Removal(21.0), below)) and not problem.fits((replacing,))
+    for layout in ((Removal(21.0), below), (replacing,), (below,)):
+        free = problem.with_checks("reported")
+        failed = [c for c in check_layout(free, layout).failed if not c.existing]
+        assert problem.fits(layout) == (not failed)
 
 
 def test_any_action_of_the_environment_builds_what_meets_its_checks() -> None:
@@ -133,6 +147,8 @@ DEAR = (130.0, 120.0, 140.0)
         ({"targets": "undecided"}, "Verify with more releases before you build"),
         ({"z": DEAR}, "Build nothing: the layout that was found costs 30 EUR"),
         ({"z": DEAR, "targets": "met"}, "Build, for the target alone: ditch at x = 9."),
+        ({"z": DEAR, "targets": "met", "verified": False}, "Verify with a new design before you "),
+        ({"z": DEAR, "verified": False}, "Build nothing: the layout that was found costs 30 EUR"),
         ({"z": (99.0, 90.0, 110.0)}, "Verify with more releases before you build"),
     ],
 )  # fmt: skip

@@ -96,3 +96,13 @@ def test_a_row_that_is_being_written_is_left_out(tmp_path):
     (one,) = tried(tmp_path)
     assert (one.layout, one.simulations, one.objective, one.risk) == ((), 25, 197.5, 197.5)
     assert tried(tmp_path / "none") == []
+
+
+def test_a_verified_layout_remains_verified(tmp_path):
+    head = "simulations,stage,releases,objective,objective_low,objective_high,capital,harm,"
+    head += "repair,cost,barriers\n"
+    stages = {"search": 300.0, "verification": 200.0, "frontier": 250.0}
+    rows = [f'25,{s},12,{z},100.0,400.0,0.0,{z},0.0,0.0,"[]"\n' for s, z in stages.items()]
+    (tmp_path / "evaluations.csv").write_text(head + "".join(rows), encoding="utf-8")
+    (one,) = tried(tmp_path)
+    assert (one.stage, one.objective) == ("verification", 200.0)

@@ -124,13 +124,6 @@ class History:
         """Return the entries of one stage."""
         return tuple(entry for entry in self.entries if entry.stage == name)
 
-    def best_so_far(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return simulations used (n,) and the least objective so far (n,) in the search."""
-        searched = self.stage("search")
-        objective = [entry.evaluation.objective for entry in searched]
-        best = np.minimum.accumulate(np.array(objective, dtype=np.float64))
-        return np.array([entry.simulations for entry in searched], dtype=np.int64), best
-
 
 @dataclass(frozen=True, slots=True)
 class DesignResult:

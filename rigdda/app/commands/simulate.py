@@ -87,6 +87,7 @@ def simulate(
         show(tables.points(points))
         note(findings.unfitted(where))
         note(findings.of_layout(where, barriers, event))
+        warn_of_placeholders(site)
         click.echo(f"{releases} releases of points; points.csv is in {folder}")
         return
     where.realise(barriers, seed, event)  # report an impossible layout before making a folder

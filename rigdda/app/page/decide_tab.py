@@ -16,7 +16,15 @@ from rigdda.agents.designers import DEFAULT, DESIGNERS
 from rigdda.app.page import placing
 from rigdda.app.page.barriers_tab import NAMES, alternatives_html, shown
 from rigdda.app.page.forms import Bound, button, heading, in_words, legend, paragraph, text
-from rigdda.app.page.jobs import CANCELLED, FAILED, INTERRUPTED, RUNNING, Tried, tried
+from rigdda.app.page.jobs import (
+    CANCELLED,
+    FAILED,
+    INTERRUPTED,
+    RUNNING,
+    VERIFIED,
+    Tried,
+    tried,
+)  # fmt: skip
 from rigdda.app.page.known_layout import MOST_BARRIERS
 from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.section import plain_axes
@@ -37,9 +45,6 @@ TARGETS = {
     "--target-risk": "At most: individual risk [per year]",
 }
 """Limits of every design event, and of the individual risk, by the option of the search."""
-
-VERIFIED = "verification"
-"""Stage of the evaluations on releases that the search did not use."""
 
 STAGES = (
     ("verified, on releases that the search did not use", SERIES[1]),

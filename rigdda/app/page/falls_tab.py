@@ -423,7 +423,8 @@ class FallsTab:
             (end, f"{100 * s.probability:.1f}", f"{100 * s.low:.1f} to {100 * s.high:.1f}")
             for end, s in shares(falls).items()
         ]
-        caption = f"Where {len(falls):,} blocks end, on this layout"
+        where = "with the layout" if self._layout else "without the layout"
+        caption = f"Where {len(falls):,} blocks end, {where}"
         self._shares.object = table(("", "blocks [%]", "95 % interval"), rows, caption)
 
     def _show_envelopes(self) -> None:

@@ -23,6 +23,9 @@ RUNNING, FINISHED, CANCELLED, FAILED, INTERRUPTED = (
 )  # fmt: skip
 """States of a job. It is interrupted if the server ended while it ran."""
 
+VERIFIED = "verification"
+"""Stage of the evaluations on releases that the search did not use."""
+
 PATIENCE = 10.0
 """Time that a cancelled process has to end before it is killed [s]."""
 
@@ -205,7 +208,8 @@ class Tried(NamedTuple):
 def tried(folder: Path) -> list[Tried]:
     """Return the layouts in evaluations.csv of a design, the last evaluation of each.
 
-    A row that is being written is left out.
+    A verification takes precedence over the evaluations of other stages. A row that is being
+    written is left out.
     """
     found: dict[Layout, Tried] = {}
     try:
@@ -213,7 +217,9 @@ def tried(folder: Path) -> list[Tried]:
             for row in csv.DictReader(file):
                 with contextlib.suppress(BadInput, ValueError, TypeError, KeyError):
                     one = _tried(row)
-                    found[one.layout] = one
+                    known = found.get(one.layout)
+                    if known is None or known.stage != VERIFIED or one.stage == VERIFIED:
+                        found[one.layout] = one
     except OSError:
         return []
     return list(found.values())

@@ -543,6 +543,8 @@ class SlopeTab:
 
         if not file.value:
             raise BadInput("survey", None, "choose a file first")
+        if road.count(None) == 1:
+            raise BadInput("road", str(road), "give both edges of the road, or neither")
         ends = (road[0], road[1]) if None not in road else None
         with tempfile.TemporaryDirectory() as folder:
             suffix = Path(file.filename or "").suffix.lower()

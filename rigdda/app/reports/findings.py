@@ -175,13 +175,8 @@ def headline(answer: DesignAnswer) -> str:
             f"Verify with more releases before you build: {layout}. These releases do not decide "
             f"whether it meets the target that {answer.asked}."
         )
-    more = answer.z[0] - answer.nothing[0]
-    if answer.z[1] > answer.nothing[2]:
-        if answer.needed:
-            return (
-                f"Build, for the target alone: {layout}. It costs {euros(more)} EUR per metre and "
-                f"year more than {answer.bare}.{_left(answer)}"
-            )
+    more, dearer = answer.z[0] - answer.nothing[0], answer.z[1] > answer.nothing[2]
+    if dearer and not answer.needed:
         return (
             f"Build nothing: the layout that was found{within} costs {euros(more)} EUR per metre "
             f"and year more than {answer.bare}: {layout}."
@@ -190,6 +185,11 @@ def headline(answer: DesignAnswer) -> str:
         return (
             f"Verify with a new design before you build: {layout}. Its Z is that of the releases "
             "by which it was chosen."
+        )
+    if dearer:
+        return (
+            f"Build, for the target alone: {layout}. It costs {euros(more)} EUR per metre and "
+            f"year more than {answer.bare}.{_left(answer)}"
         )
     if answer.z[2] >= answer.nothing[1] and not answer.needed:
         return (
@@ -288,7 +288,8 @@ def of_layout(site: Site, layout: Layout, event: str | None) -> str:
     if event is None and any(isinstance(barrier, Mesh) for barrier in layout):
         words.append(
             "mesh makes events rarer but does not change a release: this command draws events by "
-            "their rates without mesh; the commands design and study take mesh into account"
+            "their rates without mesh, as in the table of outcomes; passing rates and quantiles "
+            "over all events at the stations are those with mesh"
         )
     return "; ".join(words)
 
@@ -529,7 +530,7 @@ def compliance(done: DesignStudy) -> str:
     faults = [f"fails its checks ({failed_words(failed)})"] if failed else []
     if TARGET_RANK[free.targets] > TARGET_RANK[chosen.targets]:
         faults.append(f"has targets that are {free.targets}")
-    built = " and ".join(b.label_and_place for b in free.layout) or "no barrier"
+    built = " and ".join(b.label_and_place for b in free.layout) or unchanged(done.problem.site)
     but = f", which {' and '.join(faults)}" if faults else ""
     found = f"without required checks, the search finds {built}{but}"
     z = (

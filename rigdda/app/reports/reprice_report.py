@@ -35,6 +35,7 @@ def write(done: Repriced, folder: Path) -> None:
 def rows(done: Repriced) -> list[dict[str, Any]]:
     """Return one row for each layout; Z and its parts in EUR per metre of road and year.
 
+    The share of the debris is that of the debris without the layout on the same releases [-].
     Probabilities are those of the design event with the largest upper bound. That of a failure is
     empty if no barrier can fail.
     """
@@ -42,6 +43,7 @@ def rows(done: Repriced) -> list[dict[str, Any]]:
 
 
 def _row(done: Repriced, name: str, e: Evaluation) -> dict[str, Any]:
+    whole = done.nothing.evaluation.debris
     row: dict[str, Any] = {
         "layout": name,
         "objective": e.objective,
@@ -51,7 +53,7 @@ def _row(done: Repriced, name: str, e: Evaluation) -> dict[str, Any]:
         "harm": e.harm,
         "repair": e.repair,
         "cost": e.cost,
-        "debris_share": e.debris_share,
+        "debris_share": e.debris / whole if whole else math.nan,
         "targets": e.targets or "",
         "releases": e.releases,
         "verified": name != BEST_OF_SEARCH or done.verified,

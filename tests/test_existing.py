@@ -230,6 +230,13 @@ def test_layouts_with_removals_are_encoded() -> None:
     assert VECTORS.dropped(twice) == ("slot 1: removal: an earlier slot already removes it",)
 
 
+def test_what_a_layout_removes_is_named(site: Site) -> None:
+    old = "removed with this layout: existing fence 250 kJ at 50 %, 2.0 m high at x = 20.0 m"
+    assert findings.removed(site, (Removal(20.0),)) == old
+    assert old in findings.of_layout(site, (REPLACING,), None)
+    assert findings.removed(site, (NEW,)) == findings.removed(site, ()) == ""
+
+
 @pytest.mark.parametrize(
     ("barrier", "words"),
     [

@@ -15,7 +15,7 @@ from processes import png_size, refused, rig, rows, run, run_process, run_told
 from rerun.chunk import RrdReader
 
 import rigdda
-from rigdda import Site
+from rigdda import Site, sites
 from rigdda.agents.limits import RELEASE_SEED
 from rigdda.app import cli
 from rigdda.app.terminal import WholeNumber
@@ -332,7 +332,10 @@ def test_designers_are_compared_in_money(tmp_path: Path) -> None:
 
 def test_a_quick_look_with_points(tmp_path: Path) -> None:
     options = ("--model", "lumped", "--releases", 20, "--out", "o")
-    words = run("simulate", "verge", *options, folder=tmp_path)
+    marked = sites.text("verge").replace("[road]\n", "[road]\n# Edge; placeholder: replace.\n", 1)
+    (tmp_path / "site.toml").write_text(marked, encoding="utf-8")
+    words = run("simulate", "site.toml", *options, folder=tmp_path)
+    assert "placeholder" in words
     assert "uses default coefficients that were not fitted" in words
     assert len({row["seed"] for row in rows(tmp_path / "o/points.csv")}) == 20
 

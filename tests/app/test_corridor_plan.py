@@ -247,7 +247,7 @@ def test_layouts_are_told_with_their_places(planned: tuple[Path, str]) -> None:
     section = next(r for r in rows(out / "sections.csv") if r["budget"] == "12000.0")
     assert placed in section["layout"] and placed in " ".join(words.split())
     fronts = [(row["section"], row["layout"]) for row in rows(out / "fronts.csv")]
-    assert all("at x = " in layout or layout == "nothing" for _, layout in fronts)
+    assert all("at x = " in layout or layout == "no barrier" for _, layout in fronts)
     assert len(set(fronts)) == len(fronts)
     assert "at x = " in rows(out / "priorities.csv")[0]["build"]
 
@@ -337,7 +337,7 @@ def test_sections_without_a_gain_that_is_shown_are_named(targeted: tuple[Path, s
         low, gain, high = (float(row[name]) for name in ("gain_low", "gain", "gain_high"))
         assert low <= gain <= high
         if row["budget"] != "unlimited":
-            doubtful = row["layout"] != "nothing" and low <= 0.0
+            doubtful = row["layout"] != "no barrier" and low <= 0.0
             line = told.get(f"{float(row['budget']):.0f}", "")
             assert (f"{row['section']} (" in line) == doubtful
     assert "2000000" in told

@@ -22,6 +22,7 @@ from rigdda.app.reports.stations import QUANTILE_LEVELS, QUANTITIES, Passing
 from rigdda.app.reports.wording import figure
 from rigdda.envs.intervals import mid_p
 from rigdda.envs.quantiles import quantiles
+from rigdda.envs.siting import FeasiblePlaces
 from rigdda.files import UNFINISHED
 from rigdda.passages import PASSAGE, STATES, STOP, Passages, passages
 
@@ -416,3 +417,12 @@ def test_the_run_out_of_an_event_that_is_switched_off_is_told() -> None:
     )
     assert [row["probability"] for row in without] == [row["probability"] for row in table]
     assert {row["rate"] for row in without} == {0.0} and table[0]["probability"] == 1.0
+
+
+def test_it_is_said_which_figures_are_of_the_rates_with_mesh() -> None:
+    site = Site.load("cliff")
+    none = passages(site, (), [], [])
+    mesh = FeasiblePlaces(site, site.barrier_zone).mesh(0)
+    assert "rates with mesh" in Passing.of(site, (mesh,), None, none).of_mesh()
+    for layout, event in (((), None), ((mesh,), site.event_names[0])):
+        assert Passing.of(site, layout, event, none).of_mesh() == ""

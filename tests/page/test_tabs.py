@@ -11,10 +11,11 @@ pn = pytest.importorskip("panel", reason="the extra page is not installed")
 
 from panel.io.state import set_curdoc  # noqa: E402
 
-from rigdda import BadInput, sites  # noqa: E402
+from rigdda import BadInput, Fence, sites  # noqa: E402
 from rigdda.app import site_oddities  # noqa: E402
 from rigdda.app.page import ground, locking  # noqa: E402
 from rigdda.app.page.falls_tab import BATCH, FallsTab  # noqa: E402
+from rigdda.app.page.slope_tab import SlopeTab  # noqa: E402
 from rigdda.app.page.state import Project  # noqa: E402
 from rigdda.app.page.theme import LIGHT  # noqa: E402
 from rigdda.app.page.workspace import Workspace  # noqa: E402
@@ -51,6 +52,25 @@ def test_a_release_that_is_asked_for_before_the_tab_is_shown_is_not_lost(host):
     release.join()
     tab.tick()
     assert len(tab.section.ways.data["xs"]) == len(release.falls) == BATCH
+
+
+def test_the_shares_say_whether_the_layout_stands(host):
+    host.project.change_layout((Fence(17.0, 3.0, energy_class=1000),), "put a fence")
+    tab = FallsTab(host)
+    tab.show()
+    for built, words in ((True, "with the layout"), (False, "without the layout")):
+        tab._built.value = built
+        tab._more()
+        tab._release.join()
+        tab.tick()
+        assert f"Where {BATCH} blocks end, {words}" in html.unescape(tab._shares.object)
+
+
+@pytest.mark.parametrize("road", [[20.0, None], [None, 28.0]])
+def test_a_survey_is_not_imported_with_one_edge_of_the_road(host, road):
+    file = types.SimpleNamespace(value=b"x,y\n0,10\n30,0\n", filename="survey.csv")
+    with pytest.raises(BadInput, match="give both edges of the road"):
+        SlopeTab(host)._import_survey("new", file, None, road)
 
 
 def test_a_click_near_a_path_replays_its_block(host):

@@ -114,6 +114,7 @@ def simulate(
             click.echo(line)
     note(findings.of_layout(where, barriers, event))
     warn_of_placeholders(site)
+    note(passing.of_mesh())
     note(stations.undecided(passing))
     note(stations.lower_bound(rest))
     if passing.not_drawn:

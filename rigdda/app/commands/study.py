@@ -80,6 +80,8 @@ def study(file: str, seed: int, worst: int, out: Path | None) -> None:
     for name, layout in asked.layouts.items():
         if words := findings.unbuildable(asked.site, layout):
             note(f"the layout {name!r} {words}")
+        if words := findings.removed(asked.site, layout):
+            note(f"layout {name!r}: {words}")
     warn_of_placeholders(asked.source)
     words = f", {resumed} from an earlier run" if resumed else ""
     click.echo(f"{asked.size:,} releases{words}; tables and pictures are in {folder}")

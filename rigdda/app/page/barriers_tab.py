@@ -21,6 +21,7 @@ from rigdda.app.page.live import CHECKED
 from rigdda.app.page.placing import Grip
 from rigdda.app.page.section import HandleSource, Section
 from rigdda.app.page.theme import SERIES, TALL
+from rigdda.app.reports.wording import unchanged
 from rigdda.barriers.fence import FENCE_CLASSES
 
 if TYPE_CHECKING:
@@ -331,7 +332,7 @@ def alternatives_html(project: Project, live: Live) -> str:
     rows: list[tuple[str, ...]] = []
     bare: Mapping[str, Any] | None = None
     for name, layout in project.alternatives.items():
-        words = "; ".join(b.label for b in layout) or "no barrier"
+        words = "; ".join(b.label for b in layout) or unchanged(project.site)
         found = live.known(project.site, layout)
         rows.append((f"{name}: {words}", *_compared(found)))
         if found is not None:

@@ -24,11 +24,12 @@ from rigdda.app.page.jobs import (
     VERIFIED,
     Tried,
     tried,
-)  # fmt: skip
+)
 from rigdda.app.page.known_layout import MOST_BARRIERS
 from rigdda.app.page.locking import on_change, watch
 from rigdda.app.page.section import plain_axes
 from rigdda.app.page.theme import SERIES, TALL, WRAPPED
+from rigdda.app.reports.wording import unchanged
 from rigdda.envs.siting import Rules
 from rigdda.fields import described
 from rigdda.ground.prices import Consequences, Prices
@@ -48,7 +49,7 @@ TARGETS = {
 
 STAGES = (
     ("verified, on releases that the search did not use", SERIES[1]),
-    ("unverified, of the search", SERIES[0]),
+    ("not verified", SERIES[0]),
 )
 """Colours of the layouts in the diagram."""
 
@@ -234,6 +235,10 @@ class DecideTab:
             self._found = found
             self._show_found()
 
+    def _words(self, one: Tried) -> str:
+        """Return the barriers of a layout in words, with their chainages."""
+        return "; ".join(b.label_and_place for b in one.layout) or unchanged(self.project.site)
+
     def _met(self, layout: Layout) -> bool:
         """Return whether all barriers of a layout meet their checks."""
         site = self.project.site
@@ -256,14 +261,14 @@ class DecideTab:
             "x": [one.capital for one in found],
             "y": [one.risk for one in found],
             "colour": [SERIES[1] if one.stage == VERIFIED else SERIES[0] for one in found],
-            "words": [_words(one) for one in found],
+            "words": [self._words(one) for one in found],
             "place": list(range(len(found))),
         }
         rows: list[Any] = [heading(f"The best layouts so far, with {COST}")] if found else []
         for one in found[:BEST]:
-            verified = "verified" if one.stage == VERIFIED else "unverified"
+            verified = "verified" if one.stage == VERIFIED else "not verified"
             ends = f"{shown(one.objective)} ({shown(one.low)} to {shown(one.high)})"
-            words = f"Z = {ends}, {verified}, {one.releases:,} releases: {_words(one)}"
+            words = f"Z = {ends}, {verified}, {one.releases:,} releases: {self._words(one)}"
             rows.append(
                 pn.Row(
                     button("Take", partial(self._take, one.layout), width=70),
@@ -313,8 +318,3 @@ class DecideTab:
     def _set(self, path: tuple[str, str], value: float) -> None:
         words = f"set {path[0]}, {path[1].replace('_', ' ')}"
         self.page.act(lambda: self.project.set_value(path, round(float(value), 6), words))
-
-
-def _words(one: Tried) -> str:
-    """Return the barriers of a layout in words, with their chainages."""
-    return "; ".join(b.label_and_place for b in one.layout) or "no barrier"

@@ -15,7 +15,7 @@ from rigdda.agents.corridor.programme import RATIO
 from rigdda.agents.designers.frontier import worst
 from rigdda.app.reports.pictures import EVENTS, FONT, save
 from rigdda.app.reports.tables import empty_table, write_rows
-from rigdda.app.reports.wording import euros, percent
+from rigdda.app.reports.wording import euros, percent, unchanged
 from rigdda.barriers import KINDS, Built
 from rigdda.display import ROAD
 from rigdda.envs import Evaluation
@@ -172,9 +172,11 @@ def section_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
 def risk_columns(evaluation: Evaluation, site: rigdda.Site) -> dict[str, float | None]:
     """Return the numbers to which targets refer, with upper ends of their intervals.
 
-    They are the probabilities that rock of a design event reaches the road and that a barrier fails
-    in it, for the design event with the largest one-sided 95 % upper bound, and the individual risk
-    [1/year]. A number is None without design events, barriers that can fail, or traffic.
+    They are estimated from the releases of the evaluation, whereas the amount by which a target is
+    missed is judged by all releases of the layout, see `Option.missed`. They are the probabilities
+    that rock of a design event reaches the road and that a barrier fails in it, for the design
+    event with the largest one-sided 95 % upper bound, and the individual risk [1/year]. A number
+    is None without design events, barriers that can fail, or traffic.
     """
     out: dict[str, float | None] = {}
     for name, seen in (("reach", evaluation.reach), ("failure", evaluation.failure)):
@@ -246,7 +248,7 @@ def priority_rows(plan: CorridorPlan) -> list[dict[str, Any]]:
 
 def words(layout: rigdda.Layout, site: rigdda.Site) -> str:
     """Return a layout as text: kinds, sizes and chainages as `rigdda design` prints them."""
-    return "; ".join(_placed(barrier, site) for barrier in layout) or "nothing"
+    return "; ".join(_placed(barrier, site) for barrier in layout) or unchanged(site)
 
 
 def _placed(barrier: rigdda.Barrier, site: rigdda.Site) -> str:
@@ -397,7 +399,7 @@ def draw_strip(path: Path, plan: CorridorPlan) -> None:
         above.set_xlim(0.0, ends[-1])
         before = np.array([problem.nothing.objective for problem in plan.problem.problems])
         below.bar(starts, before, lengths, align="edge", color="0.85", edgecolor="white",
-                  linewidth=0.5, label="without barriers")  # fmt: skip
+                  linewidth=0.5, label="without new barriers")  # fmt: skip
         shades = {(len(plans) - 1) // 2: 0.45, len(plans) - 1: 1.0}
         for each, shade in ((plans[i], shade) for i, shade in shades.items()):
             left = np.array([e.harm + e.repair for e in each.evaluation.sections])

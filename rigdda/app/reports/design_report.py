@@ -527,7 +527,7 @@ def draw_band(path: Path, band: Band) -> None:
                 color=EVENTS[i % len(EVENTS)], label=case.name,
             )  # fmt: skip
         axes.set_xticks(x, [str(band.samples.index(sample) + 1) for sample in order])
-        axes.set(xlabel=f"ground ({band.source}), by Z without barriers",
+        axes.set(xlabel=f"ground ({band.source}), by Z without new barriers",
                  ylabel="Z [EUR per metre of road and year]")  # fmt: skip
         axes.set_ylim(bottom=0.0)
         axes.grid(axis="y", alpha=0.25)

@@ -281,15 +281,22 @@ def violations(site: Site, layout: Layout) -> list[BadInput]:
     )
 
 
+def removed(site: Site, layout: Layout) -> str:
+    """Return a text that names the existing barriers that a layout removes or replaces."""
+    stand = site.standing(layout)
+    gone = [b.label_and_place for b in site.existing_barriers if b not in stand]
+    return f"removed with this layout: existing {' and '.join(gone)}" if gone else ""
+
+
 def of_layout(site: Site, layout: Layout, event: str | None) -> str:
     """Return notes on the simulation of a layout; `event` is None if events are drawn by rate."""
     found = unbuildable(site, layout)
     words = [f"the layout {found}"] if found else []
+    words += filter(None, [removed(site, layout)])
     if event is None and any(isinstance(barrier, Mesh) for barrier in layout):
         words.append(
             "mesh makes events rarer but does not change a release: this command draws events by "
-            "their rates without mesh, as in the table of outcomes; passing rates and quantiles "
-            "over all events at the stations are those with mesh"
+            "their rates without mesh; the commands design and study take mesh into account"
         )
     return "; ".join(words)
 

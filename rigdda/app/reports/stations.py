@@ -94,6 +94,17 @@ class Passing(NamedTuple):
         each = [100.0 * site.rate(name, layout) * (name in events) for name in names]
         return cls(site, events, np.array(each), found)
 
+    def of_mesh(self) -> str:
+        """Return a note on the rates if mesh reduces them and there are several events."""
+        bare = [100.0 * self.site.rate(name) for name in self.events]
+        rate = [self.rate[self.site.event_names.index(name)] for name in self.events]
+        if len(self.events) < 2 or np.array_equal(bare, rate):
+            return ""
+        return (
+            "passing rates, quantiles of all events together and the run-out are those of the "
+            "rates with mesh; the other outcomes are those of the rates without mesh"
+        )
+
     @property
     def groups(self) -> list[str]:
         """Names of the events, and `ALL_EVENTS` if there are several."""

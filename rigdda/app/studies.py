@@ -28,7 +28,7 @@ from rigdda.app.reports.tables import (
     write_rows,
 )
 from rigdda.barriers import from_table
-from rigdda.envs.cost import Account, Facts, learn
+from rigdda.envs.cost import Account
 from rigdda.envs.outcome_cache import fingerprint
 from rigdda.fields import about, checked, parse
 from rigdda.files import is_file, read
@@ -326,11 +326,23 @@ def results(study: Study, path: Path) -> StudyResults:
     layouts = []
     for name, layout in study.layouts.items():
         own = [row for row in rows if row["layout"] == name]
-        on_road = np.array([_number(row["max_energy_on_road"]) for row in own])
-        hit = np.array([_hit(row) for row in own])
-        bills = _account(site, own)
-        layouts.append(StudiedLayout(name, layout, bills, 1e-3 * on_road, 1e-3 * hit))
-    return StudyResults(site, tuple(layouts), _facts(site, rows))
+        layouts.append(
+            StudiedLayout(
+                name,
+                layout,
+                _account(site, own),
+                on_road=1e-3 * _column(own, "max_energy_on_road"),
+                hit=1e-3 * np.array([_hit(row) for row in own]),
+                released=_column(own, "released_volume"),
+                widths=_column(own, "width"),
+            )
+        )
+    return StudyResults.of(site, layouts)
+
+
+def _column(rows: Sequence[dict[str, str]], name: str) -> NDArray[np.float64]:
+    """Return the numbers of a column."""
+    return np.array([_number(row[name]) for row in rows])
 
 
 def _hit(row: dict[str, str]) -> float:
@@ -345,34 +357,19 @@ def _hit(row: dict[str, str]) -> float:
 
 def _account(site: Site, rows: Sequence[dict[str, str]]) -> Account:
     """Return the account of the releases in some rows."""
-
-    def column(name: str) -> NDArray[np.float64]:
-        return np.array([_number(row[name]) for row in rows])
-
     said = [[text for name, text in row.items() if _tells_failure(name)] for row in rows]
     return Account(
         event=np.array([row["event"] for row in rows]),
-        harm=column("harm"),
-        repair=column("repair"),
-        volume=column("road_volume"),
-        reached=column("reached") > 0.0,
+        harm=_column(rows, "harm"),
+        repair=_column(rows, "repair"),
+        volume=_column(rows, "road_volume"),
+        reached=_column(rows, "reached") > 0.0,
         failed=np.array(["True" in texts for texts in said], dtype=bool),
         toll=None
         if site.traffic is None
-        else np.column_stack([column(n) for n in _TRAFFIC_COLUMNS]),
+        else np.column_stack([_column(rows, n) for n in _TRAFFIC_COLUMNS]),
     )
 
 
 def _tells_failure(field: str) -> bool:
     return field.startswith("barrier_") and field.endswith("_failed")
-
-
-def _facts(site: Site, rows: Sequence[dict[str, str]]) -> dict[str, Facts]:
-    """Return the facts about each event that the releases with all layouts provide."""
-    found, out = _account(site, rows), {}
-    released = np.array([_number(row["released_volume"]) for row in rows])
-    widths = np.array([_number(row["width"]) for row in rows])
-    for name in site.event_names:
-        own = found.event == name
-        out[name] = learn(site, found.of(own), released[own], widths[own], 1.0)
-    return out

@@ -182,12 +182,13 @@ class CorridorProblem:
         built = [row for row in rows if row[2].layout]
         whole, after = _total(rows), _total(built)
         before = _total([(length, p, p.nothing) for length, p, _ in built])
+        gain = before.minus(after)
         return CorridorEvaluation(
             sections=tuple(evaluations),
             objective=whole.value,
             ci=whole.interval,
-            gain=before.value - after.value,
-            gain_ci=difference(before, after),
+            gain=gain.value,
+            gain_ci=gain.interval,
             cost=math.fsum(length * e.cost for length, _, e in rows),
             annual=math.fsum(length * e.capital for length, _, e in rows),
         )
@@ -202,7 +203,7 @@ class CorridorProblem:
         rows = [row for row in zip(*columns, strict=True) if row[2].layout != row[3].layout]
         less = _total([(length, problem, e) for length, problem, e, _ in rows])
         more = _total([(length, problem, f) for length, problem, _, f in rows])
-        return Mean(more.value - less.value, *difference(more, less))
+        return more.minus(less)
 
 
 def _total(rows: Sequence[tuple[float, DesignProblem, Evaluation]]) -> Mean:
@@ -212,14 +213,6 @@ def _total(rows: Sequence[tuple[float, DesignProblem, Evaluation]]) -> Mean:
         own = groups.setdefault((problem.key, e.seeds), [])
         own.append(Mean(e.objective, *e.ci).times(length))
     return total(Mean(*map(math.fsum, zip(*own, strict=True))) for own in groups.values())
-
-
-def difference(one: Mean, other: Mean) -> Interval:
-    """Return the 95 % interval of the difference of two independent means (MOVER)."""
-    value = one.value - other.value
-    below = math.hypot(one.value - one.low, other.high - other.value)
-    above = math.hypot(one.high - one.value, other.value - other.low)
-    return value - below, value + above
 
 
 def _of_section(name: str, bad: BadInput) -> BadInput:

@@ -116,6 +116,17 @@ class Mean(NamedTuple):
         value = self.value + by
         return Mean(value, min(self.low, value), max(self.high, value))
 
+    def minus(self, other: Mean) -> Mean:
+        """Return the difference from an independent mean.
+
+        Its interval follows from the ends of both intervals (MOVER; Zou and Donner 2008, Statistics
+        in Medicine 27).
+        """
+        value = self.value - other.value
+        below = math.hypot(self.value - self.low, other.high - other.value)
+        above = math.hypot(self.high - self.value, other.value - other.low)
+        return Mean(value, value - below, value + above)
+
     @property
     def interval(self) -> Interval:
         """The 95 % interval."""

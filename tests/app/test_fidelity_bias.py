@@ -37,11 +37,10 @@ def test_the_bias_is_that_of_the_evaluations(site: Site) -> None:
     full = DesignProblem(site).evaluate((), seeds)
     assert found[0].full.objective == full.objective
     for c in found:
-        low, high = c.bias_ci
-        assert low <= c.bias <= high
-        assert c.bias == pytest.approx(c.fast.objective - c.full.objective)
+        assert c.bias.low <= c.bias.value <= c.bias.high
+        assert c.bias.value == pytest.approx(c.fast.objective - c.full.objective)
         below = math.hypot(c.fast.objective - c.fast.ci[0], c.full.ci[1] - c.full.objective)
-        assert c.bias - low == pytest.approx(below)
+        assert c.bias.value - c.bias.low == pytest.approx(below)
 
 
 def test_the_command_writes_its_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,9 +16,9 @@ import rigdda
 from rigdda import Site
 from rigdda.app import studies
 from rigdda.app.reports import findings, study_report
+from rigdda.app.reports.study_report import StudiedLayout, StudyResults
 from rigdda.app.reports.tables import _interval, write_rows
 from rigdda.envs.comparison import difference
-from rigdda.envs.cost import stratified
 from rigdda.envs.intervals import upper_bound
 
 EXAMPLES = Path(rigdda.__file__).parents[1] / "examples"
@@ -346,7 +346,9 @@ def test_none_of_a_few_releases_is_not_never() -> None:
     ]  # fmt: skip
     own = studies._account(site, rows)
     assert not own.failed.any() and not own.reached.any()
-    sums = stratified(site, (), own, studies._facts(site, rows))
+    none, ones = np.zeros(len(rows)), np.ones(len(rows))
+    one = StudiedLayout("no barrier", (), own, none, none, released=ones, widths=ones)
+    sums = StudyResults.of(site, [one]).sums(one)
     least = site.rate(site.event_names[0], ()) * site.consequences.harm(1.0, True) / 16
     assert sums.both.low == 0.0 and sums.both.high > least
 

@@ -128,6 +128,17 @@ def test_sums_by_the_distances_of_the_ends() -> None:
     assert one.times(2.0) == (20.0, 14.0, 28.0)
 
 
+def test_differences_by_the_distances_of_the_ends() -> None:
+    one, other = Mean(5.0, 2.0, 9.0), Mean(1.0, -3.0, 13.0)
+    found = one.minus(other)
+    assert found.value == 4.0
+    assert found.low == pytest.approx(4.0 - math.hypot(3.0, 12.0))
+    assert found.high == pytest.approx(4.0 + math.hypot(4.0, 4.0))
+    back = other.minus(one)
+    assert (back.value, back.low, back.high) == (-found.value, -found.high, -found.low)
+    assert one.minus(Mean(0.0, 0.0, 0.0)) == one
+
+
 CASES = {
     "common": (0.5, 8.0, 0.4, 0.3, 0.1),
     "one in twenty": (0.05, 8.0, 0.5, 0.2, 0.05),

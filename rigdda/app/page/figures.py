@@ -15,7 +15,7 @@ from rigdda.app.reports import study_report
 from rigdda.app.reports.study_report import StudiedLayout, StudyResults
 from rigdda.barriers import KINDS
 from rigdda.envs import DesignProblem
-from rigdda.envs.cost import Account, account, learn
+from rigdda.envs.cost import account
 from rigdda.envs.siting import Rules
 
 
@@ -42,7 +42,9 @@ def study_table(site: str, layout: Layout, file: str, releases: int) -> dict[str
     return {"site": site, "releases": releases, "layouts": tables}
 
 
-def results_of(site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Outcomes]) -> Any:
+def results_of(
+    site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Outcomes]
+) -> StudyResults:
     """Return the results of a study from the outcomes of its releases.
 
     Parameters
@@ -59,28 +61,22 @@ def results_of(site: Site, layouts: Mapping[str, Layout], seen: Mapping[str, Out
     StudyResults
         The results, equal to those of `rigdda study` on the same releases.
     """
-    flat = {n: [o for event in site.event_names for o in seen[n][event]] for n in layouts}
-    accounts = {name: account(site, layouts[name], flat[name]) for name in layouts}
-    studied = tuple(
-        StudiedLayout(
-            name,
-            layouts[name],
-            accounts[name],
-            np.array([1e-3 * outcome.max_energy_on_road for outcome in flat[name]]),
-            np.array([1e-3 * max((b.max_energy for b in o.barriers), default=0.0)
-                      for o in flat[name]]),
+    studied = []
+    for name, layout in layouts.items():
+        outcomes = [outcome for event in site.event_names for outcome in seen[name][event]]
+        hits = [max((b.max_energy for b in o.barriers), default=0.0) for o in outcomes]
+        studied.append(
+            StudiedLayout(
+                name,
+                layout,
+                account(site, layout, outcomes),
+                on_road=1e-3 * np.array([o.max_energy_on_road for o in outcomes]),
+                hit=1e-3 * np.array(hits),
+                released=np.array([o.released_volume for o in outcomes]),
+                widths=np.array([o.width for o in outcomes]),
+            )
         )
-        for name in layouts
-    )  # fmt: skip
-    together = Account.join(list(accounts.values()))
-    outcomes = [outcome for name in layouts for outcome in flat[name]]
-    released = np.array([outcome.released_volume for outcome in outcomes])
-    widths = np.array([outcome.width for outcome in outcomes])
-    facts = {}
-    for event in site.event_names:
-        own = together.event == event
-        facts[event] = learn(site, together.of(own), released[own], widths[own], 1.0)
-    return StudyResults(site, studied, facts)
+    return StudyResults.of(site, studied)
 
 
 def broken_rules(site: Site, layout: Layout) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ import msgspec
 from rigdda import BadInput, Barrier, Ditch, Embankment, Fence, Layout, Mesh, Removal, Site
 from rigdda.app.page.section import Floats, graded
 from rigdda.barriers import KINDS, from_table
+from rigdda.barriers.base import occupied
 from rigdda.barriers.fence import FENCE_CLASSES
 from rigdda.envs.siting import FeasiblePlaces
 from rigdda.fields import Described, described
@@ -64,8 +65,7 @@ def new_barrier(site: Site, layout: Layout, kind: str) -> Barrier:
     taken_spans = []
     for other in layout:
         if not isinstance(other, Mesh | Removal):
-            start, end = other.works(ground)
-            taken_spans.append((start, end + other.deflection))
+            taken_spans.append(occupied(other, other.works(ground)))
     middle = len(catalogue) // 2
     for barrier in sorted(catalogue, key=lambda b: abs(catalogue.index(b) - middle)):
         at = msgspec.structs.replace(barrier, x=zone.end)

@@ -19,7 +19,6 @@ from rigdda.app.reports.wording import euros, percent, unchanged
 from rigdda.barriers import KINDS, Built
 from rigdda.display import ROAD
 from rigdda.envs import Evaluation
-from rigdda.envs.corridor_problem import difference
 from rigdda.envs.intervals import Mean
 from rigdda.envs.problem import can_fail
 from rigdda.rounding import Rounding
@@ -200,7 +199,7 @@ def section_gain(plan: CorridorPlan, own: BudgetPlan, s: int) -> Mean:
     length = plan.problem.corridor.sections[s].length
     before = Mean(nothing.objective, *nothing.ci).times(length)
     after = Mean(evaluation.objective, *evaluation.ci).times(length)
-    return Mean(before.value - after.value, *difference(before, after))
+    return before.minus(after)
 
 
 def front_rows(plan: CorridorPlan) -> list[dict[str, Any]]:

@@ -23,7 +23,7 @@ from rigdda.app.reports.tables import (
 )
 from rigdda.app.reports.wording import euros, span
 from rigdda.envs.comparison import LEAST_PER_EVENT, Difference, difference_of_accounts
-from rigdda.envs.cost import Account, Facts, Risk, Sums, stratified
+from rigdda.envs.cost import Account, Facts, Risk, Sums, learn, stratified
 from rigdda.envs.intervals import Estimate, estimate
 from rigdda.envs.problem import can_fail
 
@@ -55,6 +55,10 @@ class StudiedLayout:
     on_road, hit : (n,) array
         Largest energy of a block on the road and of a hit on a barrier in each release [kJ/m]; 0
         without one.
+    released : (n,) array
+        Volume of rock in each release [m3].
+    widths : (n,) array
+        Width of each release [m].
     """
 
     name: str
@@ -62,6 +66,8 @@ class StudiedLayout:
     found: Account
     on_road: Floats
     hit: Floats
+    released: Floats
+    widths: Floats
 
     def chance(self, event: str, failed: bool = False) -> Estimate:
         """Return the probability that a block reaches the road, or that a barrier fails."""
@@ -96,6 +102,18 @@ class StudyResults:
     site: Site
     layouts: tuple[StudiedLayout, ...]
     facts: Mapping[str, Facts]
+
+    @classmethod
+    def of(cls, site: Site, layouts: Sequence[StudiedLayout]) -> StudyResults:
+        """Return the results of layouts on a site, with the facts that their releases provide."""
+        found = Account.join([one.found for one in layouts])
+        released = np.concatenate([one.released for one in layouts])
+        widths = np.concatenate([one.widths for one in layouts])
+        facts = {}
+        for name in site.event_names:
+            own = found.event == name
+            facts[name] = learn(site, found.of(own), released[own], widths[own], 1.0)
+        return cls(site, tuple(layouts), facts)
 
     def sums(self, one: StudiedLayout) -> Sums:
         """Return the expected harm and repair of a layout and their intervals."""

@@ -11,6 +11,7 @@ from experiments.deformable.equations import Solid, assemble, forces, solve_pcg
 from experiments.deformable.states import next_state
 from experiments.deformable.submatrices import UNKNOWNS
 from rigdda.dynamics.arrays import Matrix, Monitors, Outlines, Totals, Work, World
+from rigdda.dynamics.contact.law import set_law
 from rigdda.dynamics.detection import copy_index, detect
 from rigdda.dynamics.island_step import accumulate_force
 from rigdda.dynamics.islands import find_islands, pair_blocks
@@ -36,6 +37,8 @@ def settle(
     pairs: int, p: Parameters, counters: NDArray,
 ) -> None:  # fmt: skip
     """Iterate until no contact changes its state."""
+    for k in range(count):
+        set_law(bodies, contacts[k], counters[STEPS] == 0, p)
     for i in range(n):
         for a in range(UNKNOWNS):
             s.d[i, a] = p.dt * s.velocity[i, a]

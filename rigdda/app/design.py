@@ -173,9 +173,10 @@ def _searched(
 ) -> tuple[DesignResult, DesignResult | None]:
     """Return the results of a designer and, if checks are required, those without required checks.
 
-    A layout of the second search that meets its checks is the first result if it is better: a
-    barrier may meet them below another one although it would not on its own. The first result has
-    the releases of both searches.
+    The second result is None if its layout is not better than that of the first, which would be
+    allowed without the condition, too. If it is better and meets its checks, it is the first
+    result: a barrier may meet them below another one although it would not on its own. The first
+    result has the releases of both searches.
     """
     search = free_search = designers.module(name).design
     if name in designers.STOPPING:
@@ -198,8 +199,9 @@ def _searched(
     unchecked: DesignResult | None = free_search(free, more, seed, go_on, store)
     assert unchecked is not None
     both = result.simulations + unchecked.simulations
-    better = final_score(free, unchecked.evaluation) < final_score(free, result.evaluation)
-    if better and check_layout(free, unchecked.layout).satisfied:
+    if final_score(free, unchecked.evaluation) >= final_score(free, result.evaluation):
+        unchecked = None
+    elif check_layout(free, unchecked.layout).satisfied:
         result, unchecked = replace(unchecked, tried=result.tried), None
     return replace(result, simulations=both), unchecked
 

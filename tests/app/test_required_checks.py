@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from rigdda import BadInput, Ditch, Fence, Site
+from rigdda import BadInput, Ditch, Fence, Layout, Site
+from rigdda.agents import designers
 from rigdda.agents.designers.menu import Menu
+from rigdda.agents.designers.protocol import Ledger
+from rigdda.agents.designers.store import Store
 from rigdda.app.barrier_checks import check_layout
+from rigdda.app.design import _searched
 from rigdda.app.reports import findings
 from rigdda.app.reports.findings import DesignAnswer, FailedCheck, headline
 from rigdda.barriers import Removal
@@ -189,3 +196,33 @@ def test_an_existing_barrier_that_fails_does_not_disqualify_a_layout() -> None:
     assert not both.satisfied
     assert {check.barrier for check in both.failed if not check.existing} == {new[0].label}
     assert len(findings.failed_checks(both)) < len(both.failed)
+
+
+COSTLY = Fence(5.2, 4.0, energy_class=3000)
+CHEAP = Fence(7.0, 1.5, energy_class=100)
+"""Both may stand on `verge`; the second fails its checks and costs less than it saves."""
+
+
+@pytest.mark.parametrize(
+    ("free", "kept"), [((COSTLY,), None), ((), None), ((CHEAP,), (CHEAP,))], ids=repr
+)
+def test_a_search_without_required_checks_counts_only_if_it_finds_a_better_layout(
+    free: Layout,
+    kept: Layout | None,
+    required: DesignProblem,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    def design(problem, simulations, seed, progress, store):
+        ledger = Ledger(problem, simulations, seed, progress, store)
+        layout = () if problem.checks == "required" else free
+        return ledger.result(ledger.evaluate(layout, "report", 20), "start")
+
+    monkeypatch.setattr(designers, "module", lambda name: SimpleNamespace(design=design))
+    interim = SimpleNamespace(consider=lambda entry: None)
+    store = Store(tmp_path / "evaluations.jsonl", outcomes=True)
+    entries: list = []
+    found, unchecked = _searched(required, "one", 40, 0, entries.append, store, 0.0, interim)
+    assert found.layout == ()
+    assert (None if unchecked is None else unchecked.layout) == kept
+    assert found.simulations == 40

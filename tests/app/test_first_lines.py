@@ -282,6 +282,16 @@ def test_the_checks_cost_only_what_the_targets_do_not(
     assert line.endswith(unknown) != attributed
 
 
+def test_a_layout_without_checks_that_verification_shows_to_be_worse_is_no_find() -> None:
+    cases = {"nothing": NOTHING, "without checks": DEAR, "optimised (race)": CHEAP}
+    worse = Difference(-95.0, (-110.0, -80.0), 40, 30)
+    done = study(cases, failing=("without checks",), difference=worse, **REQUIRED)
+    assert findings.compliance(done) == "without required checks, the search found no better layout"
+    alike = Difference(-5.0, (-20.0, 10.0), 40, 30)
+    done = study(cases, failing=("without checks",), difference=alike, **REQUIRED)
+    assert "it is not shown that meeting the checks costs anything" in findings.compliance(done)
+
+
 def test_a_design_event_without_releases_is_left_out_and_named(tmp_path: Path) -> None:
     done = study({"nothing": NOTHING, "race": without_releases_of("block")})
     assert findings.reaching(done.chosen.evaluation, SITE) == ("", 0.0)

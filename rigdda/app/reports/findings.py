@@ -530,8 +530,9 @@ def compliance(done: DesignStudy) -> str:
     if done.problem.checks != "required" or not was_searched(done):
         return ""
     other, chosen = done.unchecked, done.chosen.evaluation
+    no_better = "without required checks, the search found no better layout"
     if other is None:
-        return "without required checks, the search found no better layout"
+        return no_better
     free = other.evaluation
     failed = failed_checks(done.other_checks[other.name])
     faults = [f"fails its checks ({failed_words(failed)})"] if failed else []
@@ -556,6 +557,8 @@ def compliance(done: DesignStudy) -> str:
         cost = f"it is not shown that meeting the checks costs anything ({known})"
         if apart.ci[0] > 0.0:
             cost = f"meeting the checks costs {known}"
+        elif apart.ci[1] < 0.0:  # the search thought it better, the verification does not
+            return no_better
     return f"{found}: {cost}, as {z}"
 
 

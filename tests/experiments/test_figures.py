@@ -33,7 +33,7 @@ def marked(script: str):
     """Return a script with its marks."""
     marks = [pytest.mark.slow] if script in SLOW else []
     if script in MISSED:
-        marks.append(pytest.mark.xfail(reason=MISSED[script]))
+        marks.append(pytest.mark.xfail(strict=True, reason=MISSED[script]))
     return pytest.param(script, marks=marks)
 
 
